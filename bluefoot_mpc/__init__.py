@@ -1,0 +1,1 @@
+"""Model-based control of the BlueFoot quadruped."""

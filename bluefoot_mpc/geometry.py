@@ -1,0 +1,163 @@
+"""Rotations, planar polygons and other geometry that every stage shares.
+
+Rotation matrices map coordinates: ``rotation_base_to_world @ x_in_base`` is
+``x_in_world``. Quaternions are ``x, y, z, w``. Euler angles are roll, pitch,
+yaw of the zyx sequence: ``R = Rz(yaw) Ry(pitch) Rx(roll)``.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bluefoot_mpc.types import FloatArray
+
+
+def wrap_angle(angle: float) -> float:
+    """The same angle in (-pi, pi]."""
+    return math.pi - (math.pi - angle) % (2.0 * math.pi)
+
+
+def skew(vector: FloatArray) -> FloatArray:
+    """(3, 3) matrix S with ``S @ x == cross(vector, x)``."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross product of two 3-vectors, several times faster than ``np.cross``."""
+    return np.array(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
+
+
+def rotation_z(angle: float) -> FloatArray:
+    """(3, 3) rotation about z by `angle` (rad)."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
+    """(3, 3) rotation_base_to_world of roll, pitch, yaw (rad)."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def rpy_from_rotation(rotation: FloatArray) -> FloatArray:
+    """(3,) roll, pitch, yaw (rad) of a rotation matrix; pitch in [-pi/2, pi/2]."""
+    pitch = math.asin(min(1.0, max(-1.0, -float(rotation[2, 0]))))
+    roll = math.atan2(rotation[2, 1], rotation[2, 2])
+    yaw = math.atan2(rotation[1, 0], rotation[0, 0])
+    return np.array([roll, pitch, yaw])
+
+
+def rotation_from_quaternion(quaternion: FloatArray) -> FloatArray:
+    """(3, 3) rotation of a unit quaternion ``x, y, z, w``."""
+    x, y, z, w = (float(c) for c in quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_from_rpy(rpy: FloatArray) -> FloatArray:
+    """(4,) quaternion ``x, y, z, w`` of roll, pitch, yaw (rad)."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(0.5 * rpy), np.sin(0.5 * rpy)
+    return np.array(
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ]
+    )
+
+
+def rpy_from_quaternion(quaternion: FloatArray) -> FloatArray:
+    """(3,) roll, pitch, yaw (rad) of a unit quaternion ``x, y, z, w``."""
+    return rpy_from_rotation(rotation_from_quaternion(quaternion))
+
+
+def quaternion_product(a: FloatArray, b: FloatArray) -> FloatArray:
+    """(4,) Hamilton product; rotates by `b` first, then by `a`."""
+    ax, ay, az, aw = (float(c) for c in a)
+    bx, by, bz, bw = (float(c) for c in b)
+    return np.array(
+        [
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ]
+    )
+
+
+def quaternion_from_rotation_vector(vector: FloatArray) -> FloatArray:
+    """(4,) quaternion of the rotation by ``|vector|`` rad about `vector`."""
+    angle = math.sqrt(float(vector @ vector))
+    # sin(a/2)/a near zero by its series, so that tiny steps keep their accuracy.
+    half_sinc = 0.5 - angle * angle / 48.0 if angle < 1e-4 else math.sin(0.5 * angle) / angle
+    return np.array([*(half_sinc * vector), math.cos(0.5 * angle)])
+
+
+def convex_hull(points: FloatArray) -> FloatArray:
+    """(k, 2) corners of the convex hull of (n, 2) `points`, counter-clockwise.
+
+    Collinear points are dropped; fewer than three distinct corners give a
+    point or a segment back.
+    """
+    unique = sorted({(float(x), float(y)) for x, y in points})
+    if len(unique) <= 2:
+        return np.array(unique).reshape(-1, 2)
+    lower = _half_hull(unique)
+    upper = _half_hull(unique[::-1])
+    return np.array(lower[:-1] + upper[:-1])
+
+
+def signed_margin(point: FloatArray, polygon: FloatArray) -> float:
+    """Signed distance of a planar point to a convex polygon's edge, + inside (m).
+
+    Args:
+        point: (2,) m.
+        polygon: (k, 2) m, counter-clockwise corners; with k = 2 the distance to
+            the segment comes back, negative; with k = 1 that to the point.
+    """
+    if len(polygon) >= 3:
+        edges = np.roll(polygon, -1, axis=0) - polygon
+        offset = point - polygon
+        distance = (edges[:, 0] * offset[:, 1] - edges[:, 1] * offset[:, 0]) / np.hypot(*edges.T)
+        if np.all(distance >= 0.0):
+            return float(distance.min())
+    corners = np.vstack([polygon, polygon[:1]])
+    return -min(_segment_distance(point, a, b) for a, b in zip(corners[:-1], corners[1:], strict=True))
+
+
+def _half_hull(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    hull: list[tuple[float, float]] = []
+    for p in points:
+        while len(hull) >= 2 and _turn(hull[-2], hull[-1], p) <= 0.0:
+            hull.pop()
+        hull.append(p)
+    return hull
+
+
+def _turn(o: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> float:
+    return (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0])
+
+
+def _segment_distance(point: FloatArray, a: FloatArray, b: FloatArray) -> float:
+    along = b - a
+    length_squared = float(along @ along)
+    share = 0.0 if length_squared == 0.0 else float((point - a) @ along) / length_squared
+    nearest = a + min(1.0, max(0.0, share)) * along
+    return float(np.hypot(*(point - nearest)))

@@ -1,0 +1,1 @@
+"""The robot interface, the safety supervisor, and the devices behind them."""

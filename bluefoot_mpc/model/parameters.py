@@ -1,0 +1,258 @@
+"""The robot's parameters, read from one TOML file and checked."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.model.resources import model_file
+from bluefoot_mpc.settings import build, read_toml, require_finite, require_nonnegative, require_positive
+from bluefoot_mpc.types import FloatArray
+
+GRAVITY = 9.80665
+"""m/s², the one value that Pinocchio, MuJoCo and every law use."""
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class JointRanges:
+    """Lowest and highest angle of each joint of a leg, degrees."""
+
+    hip_yaw: Range
+    hip_pitch: Range
+    knee: Range
+    ankle: Range
+
+    def __post_init__(self) -> None:
+        for name in ("hip_yaw", "hip_pitch", "knee", "ankle"):
+            low, high = getattr(self, name)
+            if not -180.0 <= low < high <= 180.0:
+                raise ConfigurationError(f"{name} = [{low:g}, {high:g}] must be rising and inside ±180 degrees")
+
+    def radians(self) -> tuple[FloatArray, FloatArray]:
+        """(4,) lower and (4,) upper limits of one leg, rad."""
+        table = np.radians([self.hip_yaw, self.hip_pitch, self.knee, self.ankle])
+        return table[:, 0].copy(), table[:, 1].copy()
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class LegParameters:
+    """Geometry of the legs, equal for all four but for their azimuth."""
+
+    link_lengths: tuple[float, float, float, float]  # m
+    hip_offset: float  # m, trunk centre to hip_yaw axis
+    hip_azimuth_deg: tuple[float, float, float, float]  # FL, FR, RL, RR
+    foot_radius: float  # m
+    limits_deg: JointRanges  # imposed by software
+    physical_limits_deg: JointRanges  # where the mechanism stops
+
+    def __post_init__(self) -> None:
+        require_positive(hip_offset=self.hip_offset, foot_radius=self.foot_radius)
+        for length in self.link_lengths:
+            require_positive(link_lengths=length)
+        require_finite(hip_azimuth_deg=self.hip_azimuth_deg)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StanceParameters:
+    """Default stance: where the feet stand under a level trunk."""
+
+    foot_x: float  # m
+    foot_y: float  # m
+    trunk_height: float  # m, trunk origin above the foot points
+    ankle_direction_deg: float  # direction of the last link in the leg's plane
+
+    def __post_init__(self) -> None:
+        require_positive(foot_x=self.foot_x, foot_y=self.foot_y, trunk_height=self.trunk_height)
+
+    @property
+    def foot_position(self) -> FloatArray:
+        """(4, 3) m, feet on the ground under the trunk's centre, FL, FR, RL, RR."""
+        signs = np.array([[1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], dtype=np.float64)
+        return signs * np.array([self.foot_x, self.foot_y, 0.0])
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ServoParameters:
+    """A position-controlled servo as its data sheet and identification give it."""
+
+    stall_torque: float  # N·m at nominal voltage
+    no_load_speed: float  # rad/s at nominal voltage
+    nominal_voltage: float  # V
+    steps: int  # counts over the range
+    range_deg: float
+    compliance_slope: float  # counts of error for full duty
+    compliance_margin: float  # counts without reaction
+    punch: float  # of 1023, least duty outside the margin
+    armature: float  # kg·m²
+    coulomb_friction: float  # N·m
+    viscous_friction: float  # N·m·s/rad
+    load_friction: float  # share of transmitted torque
+    backlash_deg: float
+    stall_current: float  # A
+    thermal_resistance: float  # K/W
+    thermal_time_constant: float  # s
+    ambient: float  # °C
+
+    def __post_init__(self) -> None:
+        require_positive(
+            stall_torque=self.stall_torque, no_load_speed=self.no_load_speed,
+            nominal_voltage=self.nominal_voltage, steps=self.steps, range_deg=self.range_deg,
+            compliance_slope=self.compliance_slope, armature=self.armature,
+            stall_current=self.stall_current, thermal_time_constant=self.thermal_time_constant,
+        )  # fmt: skip
+        require_nonnegative(
+            compliance_margin=self.compliance_margin, punch=self.punch,
+            coulomb_friction=self.coulomb_friction, viscous_friction=self.viscous_friction,
+            load_friction=self.load_friction, backlash_deg=self.backlash_deg,
+            thermal_resistance=self.thermal_resistance,
+        )  # fmt: skip
+
+    @property
+    def step_angle(self) -> float:
+        """rad per count."""
+        return math.radians(self.range_deg) / (self.steps - 1)
+
+    @property
+    def stiffness(self) -> float:
+        """N·m/rad at nominal voltage: full duty over the compliance slope."""
+        return self.stall_torque / (self.compliance_slope * self.step_angle)
+
+    @property
+    def back_emf(self) -> float:
+        """N·m·s/rad: torque lost per speed, stall torque over no-load speed."""
+        return self.stall_torque / self.no_load_speed
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class BatteryParameters:
+    """The servos' pack."""
+
+    resistance: float  # Ω
+    full_voltage: float  # V
+    empty_voltage: float  # V
+
+    def __post_init__(self) -> None:
+        require_nonnegative(resistance=self.resistance)
+        require_positive(full_voltage=self.full_voltage, empty_voltage=self.empty_voltage)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SensorMounts:
+    """Mounting points in the base frame, m."""
+
+    imu: tuple[float, float, float]
+    lidar: tuple[float, float, float]
+    camera: tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PowerLoad:
+    """One consumer of the power table."""
+
+    name: str
+    net: int
+    voltage: float  # V
+    current: float  # A
+
+    def __post_init__(self) -> None:
+        require_positive(voltage=self.voltage)
+        require_nonnegative(current=self.current)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PowerPack:
+    """One battery of the power table."""
+
+    net: int
+    voltage: float  # V
+    capacity_ah: float
+
+    def __post_init__(self) -> None:
+        require_positive(voltage=self.voltage, capacity_ah=self.capacity_ah)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PowerParameters:
+    """The power table of the robot."""
+
+    losses: float  # W
+    worst_case: float  # W
+    loads: tuple[PowerLoad, ...]
+    packs: tuple[PowerPack, ...]
+
+    def __post_init__(self) -> None:
+        require_nonnegative(losses=self.losses)
+        require_positive(worst_case=self.worst_case)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Part:
+    """A rigid piece of the mass budget, and what it looks like.
+
+    Leg bodies are ``link1`` to ``link4``, their frames at the joint with x along
+    the link; each leg gets its own copy. ``size`` is x, y, z of a box, radius
+    and length of a cylinder (along z, or x for ``cylinder_x``), or a radius.
+    """
+
+    name: str
+    body: Literal["trunk", "link1", "link2", "link3", "link4"]
+    mass: float  # kg
+    shape: Literal["box", "cylinder", "cylinder_x", "sphere"]
+    size: tuple[float, ...]  # m
+    position: tuple[float, float, float]  # m, centre in the body's frame
+
+    def __post_init__(self) -> None:
+        require_positive(mass=self.mass)
+        count = {"box": 3, "cylinder": 2, "cylinder_x": 2, "sphere": 1}[self.shape]
+        if len(self.size) != count:
+            raise ConfigurationError(f"part {self.name}: a {self.shape} takes {count} sizes, not {len(self.size)}")
+        for length in self.size:
+            require_positive(size=length)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RobotParameters:
+    """Everything that describes one robot."""
+
+    name: str
+    legs: LegParameters
+    stance: StanceParameters
+    servo: ServoParameters
+    battery: BatteryParameters
+    sensors: SensorMounts
+    power: PowerParameters
+    parts: tuple[Part, ...]
+
+    def __post_init__(self) -> None:
+        for body in ("trunk", "link1", "link2", "link3", "link4"):
+            if not any(part.body == body for part in self.parts):
+                raise ConfigurationError(f"no [[parts]] entry gives the body '{body}' a mass")
+
+    @property
+    def total_mass(self) -> float:
+        """kg, the trunk and four legs."""
+        return sum(part.mass * (1 if part.body == "trunk" else 4) for part in self.parts)
+
+
+def load_parameters(path: str | Path | None = None) -> RobotParameters:
+    """Read a robot's parameter file.
+
+    Args:
+        path: a TOML file, or the name of one that ships (``"bluefoot"``);
+            ``None`` is BlueFoot itself.
+
+    Raises:
+        ConfigurationError: the file is missing, or a value is missing or impossible.
+    """
+    file = model_file(path or "bluefoot")
+    try:
+        return build(RobotParameters, read_toml(file))
+    except ConfigurationError as error:
+        raise type(error)(f"{file.name}: {error}") if type(error) is ConfigurationError else error from error
