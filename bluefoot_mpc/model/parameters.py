@@ -116,17 +116,17 @@ class ServoParameters:
 
     @property
     def step_angle(self) -> float:
-        """rad per count."""
+        """Angle of one count, rad."""
         return math.radians(self.range_deg) / (self.steps - 1)
 
     @property
     def stiffness(self) -> float:
-        """N·m/rad at nominal voltage: full duty over the compliance slope."""
+        """Stiffness, N·m/rad at nominal voltage: full duty over the compliance slope."""
         return self.stall_torque / (self.compliance_slope * self.step_angle)
 
     @property
     def back_emf(self) -> float:
-        """N·m·s/rad: torque lost per speed, stall torque over no-load speed."""
+        """Back-EMF, N·m·s/rad: torque lost per speed, stall torque over no-load speed."""
         return self.stall_torque / self.no_load_speed
 
 
