@@ -1,0 +1,76 @@
+"""Options that every run takes, whatever the scenario: what the command line and scripts fill in."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+
+ROBOTS = ("sim",)
+CONTROLLERS = ("cpg",)
+RANDOMIZATIONS = ("none", "standard")
+GAITS = ("trot", "walk")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RunOptions:
+    """What a user may choose for one run; ``None`` leaves the scenario's own value.
+
+    Raises:
+        ConfigurationError: a value is impossible, naming it.
+        UnknownNameError: a name is not one of the valid choices.
+    """
+
+    robot: str = "sim"
+    controller: str = "cpg"
+    model: str | None = None  # parameter file, or the name of one that ships
+    seed: int = 0
+    duration: float | None = None  # s
+    out: Path | None = None  # folder for the results
+    view: bool = False
+    config: Path | None = None  # TOML with any part of the resolved configuration
+    overrides: tuple[str, ...] = ()  # "section.key=value"
+    randomize: str = "none"
+    report: bool = True
+    world: str | None = None  # name or file
+    friction: float | None = None
+    slope: float | None = None  # degrees, positive climbs
+    payload: tuple[float, float, float, float] | None = None  # kg, x, y, z in the base frame (m)
+    gait: str | None = None
+    speed: float | None = None  # m/s
+    lateral_speed: float | None = None  # m/s
+    yaw_rate: float | None = None  # rad/s
+    impulse: float | None = None  # N·s
+    direction: float | None = None  # degrees from forward, left positive
+    push_time: float | None = None  # s
+
+    def __post_init__(self) -> None:
+        _require_choice("robot", self.robot, ROBOTS)
+        _require_choice("controller", self.controller, CONTROLLERS)
+        _require_choice("randomization", self.randomize, RANDOMIZATIONS)
+        if self.gait is not None:
+            _require_choice("gait", self.gait, GAITS)
+        for name in ("speed", "lateral_speed", "yaw_rate", "slope", "direction"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise ConfigurationError(f"--{name.replace('_', '-')} = {value} must be a finite number")
+        if self.payload is not None and not all(map(math.isfinite, self.payload)):
+            raise ConfigurationError(f"--payload = {self.payload} must be finite numbers KG,X,Y,Z")
+        for name in ("duration", "friction", "impulse"):
+            _require_positive(name, getattr(self, name))
+        if self.push_time is not None and not (math.isfinite(self.push_time) and self.push_time >= 0.0):
+            raise ConfigurationError(f"--push-time = {self.push_time} must not be negative (seconds)")
+        if self.seed < 0:
+            raise ConfigurationError(f"--seed = {self.seed} must not be negative")
+
+
+def _require_choice(kind: str, value: str, valid: tuple[str, ...]) -> None:
+    if value not in valid:
+        raise UnknownNameError(kind, value, valid)
+
+
+def _require_positive(name: str, value: float | None) -> None:
+    if value is not None and not (math.isfinite(value) and value > 0.0):
+        raise ConfigurationError(f"--{name} = {value} must be a positive number")
