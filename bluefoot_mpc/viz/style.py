@@ -42,7 +42,8 @@ SUPPORT = "#12a17c"
 
 _FONTS = ["Inter", "Source Sans 3", "Helvetica Neue", "Arial", "Liberation Sans", "DejaVu Sans"]
 
-_SETTINGS: dict[str, Any] = {
+# Typed Any: matplotlib's own type lists every key and differs between versions.
+_SETTINGS: Any = {
     "figure.dpi": 110,
     "savefig.dpi": 160,
     "savefig.bbox": "tight",
