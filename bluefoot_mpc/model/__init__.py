@@ -1,0 +1,1 @@
+"""The robot itself: parameters, URDF, kinematics, dynamics, servos and power."""

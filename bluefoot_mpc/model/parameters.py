@@ -11,8 +11,15 @@ import numpy as np
 
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.model.resources import model_file
-from bluefoot_mpc.settings import build, read_toml, require_finite, require_nonnegative, require_positive
-from bluefoot_mpc.types import FloatArray
+from bluefoot_mpc.settings import (
+    build,
+    read_toml,
+    require_finite,
+    require_nonnegative,
+    require_positive,
+    require_range,
+)
+from bluefoot_mpc.types import LEG_JOINTS, FloatArray
 
 GRAVITY = 9.80665
 """m/s², the one value that Pinocchio, MuJoCo and every law use."""
@@ -30,10 +37,12 @@ class JointRanges:
     ankle: Range
 
     def __post_init__(self) -> None:
-        for name in ("hip_yaw", "hip_pitch", "knee", "ankle"):
+        for name in LEG_JOINTS:
             low, high = getattr(self, name)
             if not -180.0 <= low < high <= 180.0:
-                raise ConfigurationError(f"{name} = [{low:g}, {high:g}] must be rising and inside ±180 degrees")
+                raise ConfigurationError(
+                    f"{name} = [{low:g}, {high:g}] must be rising and inside ±180 degrees"
+                )
 
     def radians(self) -> tuple[FloatArray, FloatArray]:
         """(4,) lower and (4,) upper limits of one leg, rad."""
@@ -54,9 +63,22 @@ class LegParameters:
 
     def __post_init__(self) -> None:
         require_positive(hip_offset=self.hip_offset, foot_radius=self.foot_radius)
-        for length in self.link_lengths:
-            require_positive(link_lengths=length)
+        require_positive(**{f"link_lengths[{i}]": length for i, length in enumerate(self.link_lengths)})
         require_finite(hip_azimuth_deg=self.hip_azimuth_deg)
+        if self.foot_radius >= self.link_lengths[3]:
+            raise ConfigurationError(
+                f"foot_radius = {self.foot_radius:g} must be less than the last link, "
+                f"link_lengths[3] = {self.link_lengths[3]:g}"
+            )
+        for name in LEG_JOINTS:
+            (low, high), (lowest, highest) = (
+                getattr(limits, name) for limits in (self.limits_deg, self.physical_limits_deg)
+            )
+            if low < lowest or high > highest:
+                raise ConfigurationError(
+                    f"limits_deg.{name} = [{low:g}, {high:g}] must lie inside "
+                    f"physical_limits_deg.{name} = [{lowest:g}, {highest:g}]"
+                )
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -70,12 +92,13 @@ class StanceParameters:
 
     def __post_init__(self) -> None:
         require_positive(foot_x=self.foot_x, foot_y=self.foot_y, trunk_height=self.trunk_height)
+        require_range(-180.0, 180.0, ankle_direction_deg=self.ankle_direction_deg)
 
     @property
     def foot_position(self) -> FloatArray:
         """(4, 3) m, feet on the ground under the trunk's centre, FL, FR, RL, RR."""
-        signs = np.array([[1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], dtype=np.float64)
-        return signs * np.array([self.foot_x, self.foot_y, 0.0])
+        x, y = self.foot_x, self.foot_y
+        return np.array([[x, y, 0.0], [x, -y, 0.0], [-x, y, 0.0], [-x, -y, 0.0]])
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -113,6 +136,9 @@ class ServoParameters:
             load_friction=self.load_friction, backlash_deg=self.backlash_deg,
             thermal_resistance=self.thermal_resistance,
         )  # fmt: skip
+        require_range(2, 65536, steps=self.steps)
+        require_range(0.0, 360.0, range_deg=self.range_deg)
+        require_range(0.0, 1.0, load_friction=self.load_friction)
 
     @property
     def step_angle(self) -> float:
@@ -141,6 +167,11 @@ class BatteryParameters:
     def __post_init__(self) -> None:
         require_nonnegative(resistance=self.resistance)
         require_positive(full_voltage=self.full_voltage, empty_voltage=self.empty_voltage)
+        if self.empty_voltage >= self.full_voltage:
+            raise ConfigurationError(
+                f"empty_voltage = {self.empty_voltage:g} must be less than "
+                f"full_voltage = {self.full_voltage:g}"
+            )
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -209,12 +240,15 @@ class Part:
     position: tuple[float, float, float]  # m, centre in the body's frame
 
     def __post_init__(self) -> None:
-        require_positive(mass=self.mass)
+        if not self.name:
+            raise ConfigurationError("name must not be empty")
+        require_positive(**{f"mass of '{self.name}'": self.mass})
         count = {"box": 3, "cylinder": 2, "cylinder_x": 2, "sphere": 1}[self.shape]
         if len(self.size) != count:
-            raise ConfigurationError(f"part {self.name}: a {self.shape} takes {count} sizes, not {len(self.size)}")
-        for length in self.size:
-            require_positive(size=length)
+            raise ConfigurationError(
+                f"size of '{self.name}': a {self.shape} takes {count} sizes, not {len(self.size)}"
+            )
+        require_positive(**{f"size[{i}] of '{self.name}'": length for i, length in enumerate(self.size)})
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -234,6 +268,10 @@ class RobotParameters:
         for body in ("trunk", "link1", "link2", "link3", "link4"):
             if not any(part.body == body for part in self.parts):
                 raise ConfigurationError(f"no [[parts]] entry gives the body '{body}' a mass")
+        names = [part.name for part in self.parts]
+        for name in names:
+            if names.count(name) > 1:
+                raise ConfigurationError(f"{names.count(name)} [[parts]] entries have the name '{name}'")
 
     @property
     def total_mass(self) -> float:
@@ -251,8 +289,9 @@ def load_parameters(path: str | Path | None = None) -> RobotParameters:
     Raises:
         ConfigurationError: the file is missing, or a value is missing or impossible.
     """
-    file = model_file(path or "bluefoot")
+    file = model_file("bluefoot" if path is None else path)
+    table = read_toml(file)
     try:
-        return build(RobotParameters, read_toml(file))
+        return build(RobotParameters, table)
     except ConfigurationError as error:
-        raise type(error)(f"{file.name}: {error}") if type(error) is ConfigurationError else error from error
+        raise ConfigurationError(f"{file.name}: {error}") from error

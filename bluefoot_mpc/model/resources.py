@@ -22,10 +22,18 @@ def model_file(name: str | Path) -> Path:
         ConfigurationError: neither exists; the message lists what ships.
     """
     given = Path(name)
-    if given.is_file():
-        return given
     shipped = models_folder() / f"{given.name}.toml"
-    if given.suffix == "" and given.parent == Path() and shipped.is_file():
+    if str(name) == shipped.stem and _is_file(shipped):
         return shipped
+    if _is_file(given):
+        return given
     names = ", ".join(sorted(path.stem for path in models_folder().glob("*.toml")))
     raise ConfigurationError(f"no parameter file '{name}': give a path to a TOML file, or one of: {names}")
+
+
+def _is_file(path: Path) -> bool:
+    """Whether a file can be found there; a name that no file system takes is none."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False

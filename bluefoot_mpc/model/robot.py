@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import functools
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
 from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.model.legs import LegGeometry, inverse
 from bluefoot_mpc.model.parameters import GRAVITY, RobotParameters, load_parameters
+from bluefoot_mpc.model.resources import model_file
 from bluefoot_mpc.model.urdf import make_urdf
-from bluefoot_mpc.types import JOINTS, LEGS, N_LEGS, FloatArray
-
-if TYPE_CHECKING:
-    from bluefoot_mpc.model.legs import LegGeometry
+from bluefoot_mpc.types import JOINTS, LEGS, FloatArray
 
 
 class RobotModel:
@@ -24,58 +22,39 @@ class RobotModel:
     Attributes:
         parameters: the parameter file's content.
         urdf: URDF text, the same for every engine.
-        pin_model: Pinocchio model with a free flyer; q (23,) and v (22,) in house order.
-        pin_data: its workspace. Not for use from several threads.
         geometry: leg geometry for the closed-form kinematics.
+        pin_model: Pinocchio model with a free flyer; q (23,) and v (22,) in house order.
+        pin_data: its workspace; not for several threads at once.
         joint_names: the sixteen joints, leg-major.
         foot_frame_ids: Pinocchio frames of the feet, FL, FR, RL, RR.
         lower: (16,) rad, lower joint limits imposed by software.
         upper: (16,) rad, upper joint limits imposed by software.
+        stance_joints: (16,) rad, joints of the default stance, read-only.
     """
 
     def __init__(self, parameters: RobotParameters) -> None:
+        """Build the model.
+
+        Raises:
+            ConfigurationError: the default stance is out of reach or breaks an imposed limit.
+        """
         self.parameters = parameters
+        self.geometry = LegGeometry.from_parameters(parameters)
+        self.stance_joints = _stance_joints(parameters, self.geometry)
         self.urdf = make_urdf(parameters)
         self.pin_model = pin.buildModelFromXML(self.urdf, pin.JointModelFreeFlyer())
         self.pin_model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
         self.pin_data = self.pin_model.createData()
+        # Names 0 and 1 are Pinocchio's universe and the free flyer.
         self.joint_names = tuple(self.pin_model.names[2:])
         if self.joint_names != JOINTS:
-            raise ConfigurationError(f"Pinocchio orders the joints {self.joint_names}, not {JOINTS}")
+            raise RuntimeError(f"Pinocchio put the joints in the order {self.joint_names}")
         self.foot_frame_ids = tuple(int(self.pin_model.getFrameId(f"{leg}_foot")) for leg in LEGS)
-        lower, upper = parameters.legs.limits_deg.radians()
-        self.lower = np.tile(lower, N_LEGS)
-        self.upper = np.tile(upper, N_LEGS)
-
-    @functools.cached_property
-    def geometry(self) -> LegGeometry:
-        """Leg geometry for the closed-form kinematics."""
-        from bluefoot_mpc.model.legs import LegGeometry  # noqa: PLC0415
-
-        return LegGeometry.from_parameters(self.parameters)
-
-    @functools.cached_property
-    def stance_joints(self) -> FloatArray:
-        """(16,) rad, joints of the default stance.
-
-        Raises:
-            ConfigurationError: a leg cannot reach its foothold, or only beyond a limit.
-        """
-        from bluefoot_mpc.model.legs import inverse  # noqa: PLC0415
-
-        stance = self.parameters.stance
-        feet = stance.foot_position - np.array([0.0, 0.0, stance.trunk_height])
-        ankle = np.full(N_LEGS, np.radians(stance.ankle_direction_deg))
-        result = inverse(self.geometry, feet, ankle)
-        for leg, reachable in zip(LEGS, result.reachable, strict=True):
-            if not reachable:
-                raise ConfigurationError(f"[stance] leg {leg} cannot reach its foot position")
-        if result.violations:
-            raise ConfigurationError(f"[stance] {'; '.join(map(str, result.violations))}")
-        return result.joints
+        self.lower = self.geometry.lower
+        self.upper = self.geometry.upper
 
     def default_stance(self) -> FloatArray:
-        """(23,) q of the default stance: level trunk at the world's origin, feet resting on z = 0."""
+        """(23,) q of the default stance: level trunk above the world's origin, feet resting on z = 0."""
         height = self.parameters.stance.trunk_height + self.parameters.legs.foot_radius
         return np.concatenate([[0.0, 0.0, height, 0.0, 0.0, 0.0, 1.0], self.stance_joints])
 
@@ -90,4 +69,24 @@ def load_robot(path: str | Path | None = None) -> RobotModel:
     Raises:
         ConfigurationError: the file is missing, or describes an impossible robot.
     """
-    return RobotModel(load_parameters(path))
+    file = model_file("bluefoot" if path is None else path)
+    parameters = load_parameters(file)
+    try:
+        return RobotModel(parameters)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{file.name}: {error}") from error
+
+
+def _stance_joints(parameters: RobotParameters, geometry: LegGeometry) -> FloatArray:
+    stance = parameters.stance
+    feet = stance.foot_position - np.array([0.0, 0.0, stance.trunk_height])
+    result = inverse(geometry, feet, math.radians(stance.ankle_direction_deg))
+    if not result.feasible:
+        raise ConfigurationError(
+            f"[stance] foot_x = {stance.foot_x:g}, foot_y = {stance.foot_y:g}, "
+            f"trunk_height = {stance.trunk_height:g}, ankle_direction_deg = {stance.ankle_direction_deg:g} "
+            f"is no stance of this robot: {'; '.join(result.describe())}"
+        )
+    joints = result.joints.copy()
+    joints.flags.writeable = False
+    return joints

@@ -32,6 +32,8 @@ MATERIALS: dict[str, tuple[float, float, float]] = {
 HEAD_PARTS = ("head", "lidar", "camera")
 """Parts of the trunk that collide by themselves, above the trunk's box."""
 
+Triple = tuple[float, float, float]
+
 _LYING = (0.0, 0.5 * math.pi, 0.0)
 
 
@@ -51,8 +53,8 @@ class Shape:
     name: str
     kind: str
     size: tuple[float, ...]
-    position: tuple[float, float, float]
-    rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    position: Triple
+    rpy: Triple = (0.0, 0.0, 0.0)
     material: str = ""
 
 
@@ -133,39 +135,27 @@ def _draw(name: str, part: Part) -> list[Shape]:
 def _cross(name: str, part: Part) -> list[Shape]:
     """The trunk's modules: two crossed bars, which leave room for the hips in the corners, and a deck."""
     (x, y, z), (cx, cy, cz) = part.size, part.position
-    deck = 0.06 * z
+    thickness = 0.06 * z
+    plate = (0.78 * x, 0.78 * y, thickness)
+    rise = 0.5 * (z + thickness)
     return [
-        Shape(name=f"{name}_long", kind="box", size=(x, 0.44 * y, z), position=(cx, cy, cz), material="shell"),
-        Shape(name=f"{name}_wide", kind="box", size=(0.44 * x, y, z), position=(cx, cy, cz), material="shell"),
-        Shape(
-            name=f"{name}_deck", kind="box", size=(0.78 * x, 0.78 * y, deck),
-            position=(cx, cy, cz + 0.5 * (z + deck)), material="panel",
-        ),
-        Shape(
-            name=f"{name}_keel", kind="box", size=(0.78 * x, 0.78 * y, deck),
-            position=(cx, cy, cz - 0.5 * (z + deck)), material="panel",
-        ),
-    ]  # fmt: skip
+        _box(f"{name}_long", (x, 0.44 * y, z), part.position, "shell"),
+        _box(f"{name}_wide", (0.44 * x, y, z), part.position, "shell"),
+        _box(f"{name}_deck", plate, (cx, cy, cz + rise), "panel"),
+        _box(f"{name}_keel", plate, (cx, cy, cz - rise), "panel"),
+    ]
 
 
 def _scanner(name: str, part: Part) -> list[Shape]:
     """A LIDAR: a square foot, a dark window all around, and a cap."""
     (radius, length), (x, y, z) = part.size, part.position
     low = z - 0.5 * length
+    foot = (2.0 * radius, 2.0 * radius, 0.55 * length)
     return [
-        Shape(
-            name=f"{name}_base", kind="box", size=(2.0 * radius, 2.0 * radius, 0.55 * length),
-            position=(x, y, low + 0.275 * length), material="panel",
-        ),
-        Shape(
-            name=f"{name}_band", kind="cylinder", size=(0.92 * radius, 0.25 * length),
-            position=(x, y, low + 0.675 * length), material="glass",
-        ),
-        Shape(
-            name=f"{name}_cap", kind="cylinder", size=(radius, 0.2 * length),
-            position=(x, y, low + 0.9 * length), material="sensor",
-        ),
-    ]  # fmt: skip
+        _box(f"{name}_base", foot, (x, y, low + 0.275 * length), "panel"),
+        _rod(f"{name}_band", (0.92 * radius, 0.25 * length), (x, y, low + 0.675 * length), "glass"),
+        _rod(f"{name}_cap", (radius, 0.2 * length), (x, y, low + 0.9 * length), "sensor"),
+    ]
 
 
 def _camera(name: str, part: Part) -> list[Shape]:
@@ -175,26 +165,24 @@ def _camera(name: str, part: Part) -> list[Shape]:
     front = x + 0.5 * depth
     return [
         _solid(name, part, "panel"),
-        Shape(
-            name=f"{name}_barrel", kind="cylinder", size=(1.25 * radius, 0.3 * depth),
-            position=(front + 0.15 * depth, y, z), rpy=_LYING, material="sensor",
-        ),
-        Shape(
-            name=f"{name}_lens", kind="cylinder", size=(radius, 0.1 * depth),
-            position=(front + 0.32 * depth, y, z), rpy=_LYING, material="glass",
-        ),
-    ]  # fmt: skip
+        _rod(f"{name}_barrel", (1.25 * radius, 0.3 * depth), (front + 0.15 * depth, y, z), "sensor", _LYING),
+        _rod(f"{name}_lens", (radius, 0.1 * depth), (front + 0.32 * depth, y, z), "glass", _LYING),
+    ]
 
 
 def _servo(name: str, part: Part) -> list[Shape]:
     """A servo block with an output horn on both sides of its shaft: z in the trunk, y at a link."""
-    (_, dy, dz), (x, y, z) = part.size, part.position
-    radius = 0.3 * min(part.size)
-    if part.body == "trunk":
-        size, rpy = (radius, dz + 0.006), (0.0, 0.0, 0.0)
-    else:
-        size, rpy = (radius, dy + 0.006), (0.5 * math.pi, 0.0, 0.0)
-    horn = Shape(
-        name=f"{name}_horn", kind="cylinder", size=size, position=(x, y, z), rpy=rpy, material="horn"
-    )
-    return [_solid(name, part, "servo"), horn]
+    along_z = part.body == "trunk"
+    size = (0.3 * min(part.size), part.size[2 if along_z else 1] + 0.006)
+    rpy = (0.0, 0.0, 0.0) if along_z else (0.5 * math.pi, 0.0, 0.0)
+    return [_solid(name, part, "servo"), _rod(f"{name}_horn", size, part.position, "horn", rpy)]
+
+
+def _box(name: str, size: Triple, position: Triple, material: str) -> Shape:
+    return Shape(name=name, kind="box", size=size, position=position, material=material)
+
+
+def _rod(
+    name: str, size: tuple[float, float], position: Triple, material: str, rpy: Triple = (0.0, 0.0, 0.0)
+) -> Shape:
+    return Shape(name=name, kind="cylinder", size=size, position=position, rpy=rpy, material=material)
