@@ -1,0 +1,26 @@
+"""Configuration of the whole controller, one section per stage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from bluefoot_mpc.control.modes import ModeConfig
+from bluefoot_mpc.control.posture import PostureConfig
+from bluefoot_mpc.control.tracking import TrackingConfig
+from bluefoot_mpc.estimation.estimator import EstimatorConfig
+from bluefoot_mpc.gait.gait import GaitConfig
+from bluefoot_mpc.model.ankle import AnkleConfig
+from bluefoot_mpc.zmp.placement import PlacementConfig
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ControlConfig:
+    """Everything that shapes the controller's behaviour."""
+
+    estimator: EstimatorConfig = field(default_factory=EstimatorConfig)
+    gait: GaitConfig = field(default_factory=GaitConfig)
+    posture: PostureConfig = field(default_factory=PostureConfig)
+    ankle: AnkleConfig = field(default_factory=AnkleConfig)
+    zmp: PlacementConfig = field(default_factory=PlacementConfig)
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
+    modes: ModeConfig = field(default_factory=ModeConfig)

@@ -1,0 +1,90 @@
+"""Where the trunk is wanted over the feet: height, commanded offset, ZMP placement, sitting."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bluefoot_mpc.model.parameters import StanceParameters
+from bluefoot_mpc.settings import require_nonnegative, require_positive
+from bluefoot_mpc.types import FloatArray, TrunkPose
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PostureConfig:
+    """Trunk posture and how fast it may change.
+
+    Heights and stance left at ``None`` are the robot's own (its parameter file).
+    """
+
+    trunk_height: float | None = None  # m, trunk origin above the foot points
+    stance_x: float | None = None  # m, foot from the trunk centre, forward
+    stance_y: float | None = None  # m, foot from the trunk centre, sideways
+    trunk_forward: float = 0.0  # m, trunk origin ahead of the middle of the feet
+    sit_height_share: float = 0.6  # of the trunk height, when sitting
+    max_rate: float = 0.08  # m/s, commanded trunk translation
+    max_turn_rate: float = 0.6  # rad/s, commanded trunk rotation
+    max_offset: float = 0.12  # m, each axis of a commanded offset
+    max_tilt: float = 0.7  # rad, each axis of a commanded rotation
+    level_gain: float = 0.15  # 1/s, slow integral that trims the trunk's mean tilt away
+    level_bound: float = 0.06  # rad, largest trim
+
+    def __post_init__(self) -> None:
+        for name in ("trunk_height", "stance_x", "stance_y"):
+            value = getattr(self, name)
+            if value is not None:
+                require_positive(**{name: value})
+        require_positive(
+            sit_height_share=self.sit_height_share, max_rate=self.max_rate, max_turn_rate=self.max_turn_rate
+        )
+        require_nonnegative(
+            max_offset=self.max_offset, max_tilt=self.max_tilt,
+            level_gain=self.level_gain, level_bound=self.level_bound,
+        )  # fmt: skip
+
+
+def follow_pose(pose: FloatArray, wanted: TrunkPose, dt: float, config: PostureConfig) -> FloatArray:
+    """(6,) m and rad, `pose` moved towards the wanted offset at limited speed.
+
+    Args:
+        pose: (6,) offset in force.
+        wanted: the command; beyond the configured bounds it is cut.
+        dt: s.
+        config: bounds and rates.
+    """
+    target = np.empty(6)
+    np.clip(wanted.position, -config.max_offset, config.max_offset, out=target[:3])
+    np.clip(wanted.rpy, -config.max_tilt, config.max_tilt, out=target[3:])
+    step = np.repeat([config.max_rate * dt, config.max_turn_rate * dt], 3)
+    return np.asarray(pose + np.clip(target - pose, -step, step))
+
+
+def trim_level(trim: FloatArray, tilt_error: FloatArray, dt: float, config: PostureConfig) -> FloatArray:
+    """(2,) rad, slow integral of the tilt error (estimate minus reference), bounded."""
+    moved = trim - config.level_gain * dt * tilt_error
+    return np.minimum(np.maximum(moved, -config.level_bound), config.level_bound)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Stance:
+    """Where the feet stand and how high the trunk is.
+
+    Attributes:
+        feet: (4, 3) m, feet around the trunk's neutral place, on the ground.
+        trunk_height: m, trunk origin above the foot points.
+    """
+
+    feet: FloatArray
+    trunk_height: float
+
+
+def stance(robot: StanceParameters, config: PostureConfig) -> Stance:
+    """The stance in force: the robot's own with what the configuration replaces."""
+    chosen = replace(
+        robot,
+        foot_x=config.stance_x or robot.foot_x,
+        foot_y=config.stance_y or robot.foot_y,
+        trunk_height=config.trunk_height or robot.trunk_height,
+    )
+    return Stance(feet=chosen.foot_position, trunk_height=chosen.trunk_height)

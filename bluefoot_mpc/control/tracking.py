@@ -1,0 +1,88 @@
+"""Closing the loop on speed and heading: the commanded twist, corrected by odometry.
+
+Servo lag and soft contacts make a gait walk a little slower and turn a little
+otherwise than its virtual robot. A bounded integral on velocity and a
+proportional pull on heading correct the command; both stay small, so that a
+wrong estimate can never run away with the gait.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bluefoot_mpc.geometry import wrap_angle
+from bluefoot_mpc.settings import require_nonnegative
+from bluefoot_mpc.types import FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TrackingConfig:
+    """Gains and bounds of the corrections."""
+
+    velocity_gain: float = 0.4  # 1/s
+    velocity_bound: float = 0.025  # m/s, largest correction
+    heading_gain: float = 0.8  # 1/s
+    heading_bound: float = 0.15  # rad/s, largest correction
+    yaw_integral_gain: float = 0.3  # 1/s², slow part of the heading correction
+
+    def __post_init__(self) -> None:
+        require_nonnegative(
+            velocity_gain=self.velocity_gain, velocity_bound=self.velocity_bound,
+            heading_gain=self.heading_gain, heading_bound=self.heading_bound,
+            yaw_integral_gain=self.yaw_integral_gain,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TrackingState:
+    """Memory of the corrections.
+
+    Attributes:
+        velocity: (2,) m/s, integral correction in the heading frame.
+        heading: rad, commanded heading in the odometry frame; NaN before the first walk.
+        yaw_rate: rad/s, integral part of the heading correction.
+    """
+
+    velocity: FloatArray = field(default_factory=lambda: np.zeros(2))
+    heading: float = float("nan")
+    yaw_rate: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Twist:
+    """Planar command: (2,) m/s forward and left in the heading frame, rad/s left."""
+
+    velocity: FloatArray
+    yaw_rate: float
+
+
+def advance(
+    state: TrackingState, wanted: Twist, measured: Twist, yaw: float, dt: float, config: TrackingConfig
+) -> tuple[TrackingState, Twist]:
+    """The new memory and the corrected twist.
+
+    Args:
+        state: memory of the corrections.
+        wanted: commanded twist.
+        measured: estimated twist of the trunk.
+        yaw: rad, estimated heading in the odometry frame.
+        dt: s.
+        config: gains and bounds.
+    """
+    heading = yaw if np.isnan(state.heading) else wrap_angle(state.heading + wanted.yaw_rate * dt)
+    error = wrap_angle(heading - yaw)
+    bound = config.velocity_bound
+    velocity = state.velocity + config.velocity_gain * dt * (wanted.velocity - measured.velocity)
+    velocity = np.minimum(np.maximum(velocity, -bound), bound)
+    limit = config.heading_bound
+    slow = min(limit, max(-limit, state.yaw_rate + config.yaw_integral_gain * error * dt))
+    turn = min(limit, max(-limit, config.heading_gain * error + slow))
+    corrected = Twist(velocity=wanted.velocity + velocity, yaw_rate=wanted.yaw_rate + turn)
+    return TrackingState(velocity=velocity, heading=heading, yaw_rate=slow), corrected
+
+
+def rest(state: TrackingState) -> TrackingState:
+    """Memory while the robot stands: the heading is forgotten, the speed correction kept."""
+    return TrackingState(velocity=state.velocity, heading=float("nan"), yaw_rate=state.yaw_rate)

@@ -1,0 +1,86 @@
+"""The trunk's reference: commanded offset, level trim, ZMP placement and sitting put together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bluefoot_mpc.control import posture
+from bluefoot_mpc.control.posture import PostureConfig
+from bluefoot_mpc.gait.gait import GaitOutput
+from bluefoot_mpc.model.legs import LegGeometry, joint_positions_in_base
+from bluefoot_mpc.model.parameters import RobotParameters
+from bluefoot_mpc.types import BodyState, FloatArray, MotionCommand, PostureReference
+from bluefoot_mpc.zmp import placement
+from bluefoot_mpc.zmp.mass_points import lump
+from bluefoot_mpc.zmp.placement import PlacementConfig
+
+
+class TrunkPlanner:
+    """Plans the trunk's pose over the feet, in the robot-relative frame b'.
+
+    Args:
+        parameters: the robot.
+        trunk_height: m, nominal height of the trunk origin over the foot points.
+        config: offsets, rates and trims.
+        zmp: the placement law.
+    """
+
+    def __init__(
+        self, parameters: RobotParameters, trunk_height: float, config: PostureConfig, zmp: PlacementConfig
+    ) -> None:
+        self._geometry = LegGeometry.from_parameters(parameters)
+        self._masses = lump(parameters)
+        self._height = trunk_height
+        self._config = config
+        self._zmp = zmp
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget every offset."""
+        self._pose = np.zeros(6)
+        self._trim = np.zeros(2)
+        self._placement = np.zeros(2)
+        self.position = np.array([self._config.trunk_forward, 0.0, self._height])
+
+    def step(
+        self, gait: GaitOutput, motion: MotionCommand, estimate: BodyState, sit_level: float, dt: float
+    ) -> tuple[PostureReference, FloatArray]:
+        """The wanted trunk and feet, and the (2,) ZMP that the placement law assumes.
+
+        Args:
+            gait: feet in b' and the gait's phase.
+            motion: the command, for the trunk offset.
+            estimate: state estimate, for the level trim and the legs' masses.
+            sit_level: 0 stands, 1 sits.
+            dt: s.
+        """
+        config = self._config
+        self._pose = posture.follow_pose(self._pose, motion.trunk, dt, config)
+        error = estimate.rpy[:2] - self._pose[3:5]
+        if sit_level == 0.0:
+            self._trim = posture.trim_level(self._trim, error, dt, config)
+        zmp = self._place(gait, estimate, dt)
+        height = self._height * (1.0 - sit_level * (1.0 - config.sit_height_share))
+        position = self._pose[:3] + [config.trunk_forward, 0.0, height]
+        position[:2] += self._placement
+        self.position = position
+        rpy = self._pose[3:].copy()
+        rpy[:2] += self._trim
+        reference = PostureReference(
+            trunk_position=position, trunk_rpy=rpy, foot_position=gait.foot_position, swing=gait.phase.swing
+        )
+        return reference, zmp
+
+    def _place(self, gait: GaitOutput, estimate: BodyState, dt: float) -> FloatArray:
+        law = self._zmp
+        if not law.enabled:
+            return np.full(2, np.nan)
+        # The law is quasi-static and its rotations are small: legs are taken in
+        # the trunk's axes, relative to the trunk's neutral place.
+        points = joint_positions_in_base(self._geometry, estimate.joint_position)
+        com = placement.centre_of_mass(self._masses, self._masses.trunk_com, points)
+        swing = gait.phase.swing if gait.phase.walking else np.zeros(4, dtype=bool)
+        zmp = placement.static_zmp(self._masses, com, points, swing) + self._placement
+        force = placement.boundary_force(self.position, gait.foot_position, law)
+        self._placement = placement.advance(self._placement, zmp, force, self._masses, dt, law)
+        return zmp

@@ -1,0 +1,180 @@
+"""The safety supervisor: one wrapper around every robot, the simulated one included.
+
+Below it nothing but checked commands reach the servos: finite, inside the
+joint limits, no faster than the servos can follow. Above it the controller
+learns, one tick later, what the supervisor wants it to do.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.io.robot import Robot
+from bluefoot_mpc.settings import require_nonnegative, require_positive
+from bluefoot_mpc.types import (
+    JOINTS,
+    N_JOINTS,
+    BoolArray,
+    FloatArray,
+    JointCommand,
+    SafetyLevel,
+    SafetyRequest,
+    SensorFrame,
+)
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SafetyConfig:
+    """Thresholds of the supervisor (3S packs, AX-12A)."""
+
+    max_goal_rate: float = 12.0  # rad/s, twice the servo's no-load speed
+    voltage_sit: float = 10.2  # V, filtered; below it the robot sits down
+    voltage_stop: float = 9.6  # V, filtered
+    voltage_time_constant: float = 1.0  # s
+    temperature_sit: float = 65.0  # °C
+    temperature_stop: float = 68.0  # °C
+    max_silent_share: float = 0.2  # of joint readings in `silence_window`
+    silence_window: float = 0.5  # s
+
+    def __post_init__(self) -> None:
+        require_positive(
+            max_goal_rate=self.max_goal_rate,
+            voltage_time_constant=self.voltage_time_constant,
+            silence_window=self.silence_window,
+            voltage_stop=self.voltage_stop,
+            temperature_sit=self.temperature_sit,
+        )
+        require_nonnegative(max_silent_share=self.max_silent_share)
+        if self.voltage_sit < self.voltage_stop or self.temperature_stop < self.temperature_sit:
+            raise ConfigurationError("the sit threshold must be met before the stop threshold")
+
+
+class SafetySupervisor:
+    """Checks every command on its way down and every frame on its way up.
+
+    Args:
+        robot: the robot to protect.
+        lower: (16,) rad, lowest goal that may be sent.
+        upper: (16,) rad, highest goal that may be sent.
+        config: thresholds.
+    """
+
+    def __init__(self, robot: Robot, lower: FloatArray, upper: FloatArray, config: SafetyConfig) -> None:
+        self.robot = robot
+        self.period = robot.period
+        self._lower, self._upper, self._config = lower, upper, config
+        self._clear()
+
+    def _clear(self) -> None:
+        self.request = SafetyRequest()
+        self.stopped = False
+        self._latched: list[tuple[SafetyLevel, str]] = []
+        self._last: JointCommand | None = None
+        self._voltage = math.nan
+        self._silent_share = 0.0
+        self._position = np.zeros(N_JOINTS)
+
+    def reset(self) -> SensorFrame:
+        """Reset the robot and forget every fault."""
+        self._clear()
+        frame = self.robot.reset()
+        self._position = frame.joint_position.copy()
+        return frame
+
+    def step(self, command: JointCommand) -> SensorFrame:
+        """Send the command as far as it is safe, and judge the frame that comes back."""
+        checked = self.check(command)
+        frame = self.robot.step(checked)
+        self._watch(frame)
+        return frame
+
+    def check(self, command: JointCommand) -> JointCommand:
+        """The command that may be sent: finite, inside limits, slew-limited."""
+        previous = self._last
+        if not (_finite(command.position) and _finite(command.speed) and _finite(command.torque_limit)):
+            bad = [JOINTS[i] for i in np.flatnonzero(~_finite_joints(command))]
+            self._latch(SafetyLevel.STOP, f"command is not finite for {', '.join(bad)}: discarded")
+            return previous if previous is not None else self._hold()
+        reference = self._position if previous is None else previous.position
+        reach = self._config.max_goal_rate * self.period
+        goal = np.clip(command.position, reference - reach, reference + reach)
+        goal = np.clip(goal, self._lower, self._upper)
+        limit = np.clip(command.torque_limit, 0.0, 1.0)
+        if self.stopped:
+            limit = np.zeros(N_JOINTS)
+        self._last = JointCommand(position=goal, speed=np.maximum(command.speed, 0.0), torque_limit=limit)
+        return self._last
+
+    def stop(self) -> None:
+        """Make the robot limp; later commands keep it so until `reset`."""
+        self.stopped = True
+        self.robot.stop()
+
+    def close(self) -> None:
+        """Give back the robot's resources."""
+        self.robot.close()
+
+    def _hold(self) -> JointCommand:
+        return JointCommand(
+            position=np.clip(self._position, self._lower, self._upper),
+            speed=np.zeros(N_JOINTS),
+            torque_limit=np.ones(N_JOINTS),
+        )
+
+    def _latch(self, level: SafetyLevel, reason: str) -> None:
+        if all(known != reason for _, known in self._latched):
+            log.warning("safety: %s", reason)
+            self._latched.append((level, reason))
+        self._publish(())
+
+    def _publish(self, passing: tuple[tuple[SafetyLevel, str], ...]) -> None:
+        findings = (*self._latched, *passing)
+        level = max((level for level, _ in findings), default=SafetyLevel.NONE)
+        self.request = SafetyRequest(level=level, reasons=tuple(reason for _, reason in findings))
+
+    def _watch(self, frame: SensorFrame) -> None:
+        config = self._config
+        if frame.joint_valid.all():
+            self._position = frame.joint_position
+        self._watch_voltage(frame)
+        hottest = int(np.argmax(frame.joint_temperature))
+        temperature = float(frame.joint_temperature[hottest])
+        if temperature >= config.temperature_sit:
+            level = SafetyLevel.STOP if temperature >= config.temperature_stop else SafetyLevel.SIT
+            self._latch(level, f"servo {JOINTS[hottest]} is hot (limit {config.temperature_sit:g} °C)")
+        blend = min(1.0, self.period / config.silence_window)
+        self._silent_share += blend * (1.0 - float(frame.joint_valid.mean()) - self._silent_share)
+        passing: tuple[tuple[SafetyLevel, str], ...] = ()
+        if self._silent_share > config.max_silent_share:
+            silent = ", ".join(JOINTS[i] for i in np.flatnonzero(~frame.joint_valid))
+            passing = ((SafetyLevel.SIT, f"too many lost joint readings (now: {silent or 'none'})"),)
+        self._publish(passing)
+
+    def _watch_voltage(self, frame: SensorFrame) -> None:
+        if not frame.voltage_valid or not math.isfinite(frame.voltage):
+            return
+        config = self._config
+        if math.isnan(self._voltage):
+            self._voltage = frame.voltage
+        blend = min(1.0, self.period / config.voltage_time_constant)
+        self._voltage += blend * (frame.voltage - self._voltage)
+        if self._voltage < config.voltage_stop:
+            self._latch(SafetyLevel.STOP, f"battery empty (below {config.voltage_stop:g} V)")
+        elif self._voltage < config.voltage_sit:
+            self._latch(SafetyLevel.SIT, f"battery low (below {config.voltage_sit:g} V)")
+
+
+def _finite(values: FloatArray) -> bool:
+    # A sum is finite only when every entry is: one call instead of two on the hot path.
+    return math.isfinite(float(values.sum()))
+
+
+def _finite_joints(command: JointCommand) -> BoolArray:
+    return np.isfinite(command.position) & np.isfinite(command.speed) & np.isfinite(command.torque_limit)

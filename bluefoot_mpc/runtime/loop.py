@@ -1,0 +1,213 @@
+"""The control loop, the same for every robot: frame in, command out, nothing lost.
+
+Whatever happens in a tick, the robot is brought to rest under torque and made
+limp before the loop ends, and what was recorded stays.
+"""
+
+from __future__ import annotations
+
+import logging
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from types import FrameType
+from typing import Any, Protocol
+
+import numpy as np
+
+from bluefoot_mpc.control.pipeline import ControlOutput
+from bluefoot_mpc.io.safety import SafetySupervisor
+from bluefoot_mpc.runtime.data import COMPLETED, CommandRecord, RunData
+from bluefoot_mpc.runtime.recorder import Recorder
+from bluefoot_mpc.types import (
+    N_JOINTS,
+    JointCommand,
+    Mode,
+    MotionCommand,
+    SafetyRequest,
+    SensorFrame,
+    TruthSample,
+)
+
+log = logging.getLogger(__name__)
+
+INTERRUPTED = "interrupted"
+AFTER_FALL = 1.0
+"""s that are still recorded after a fall, limp."""
+REST_TIMEOUT = 6.0
+"""s that an interrupted robot gets to end its gait, sit and go limp."""
+RAMP_DOWN = 1.0
+"""s over which torque is taken away when the controller itself has failed."""
+
+
+class Controller(Protocol):
+    """What the loop needs of a controller."""
+
+    def reset(self) -> None:
+        """Forget everything."""
+        ...
+
+    def step(self, frame: SensorFrame, motion: MotionCommand, safety: SafetyRequest) -> ControlOutput:
+        """One tick."""
+        ...
+
+
+CommandSource = Callable[[float], MotionCommand | None]
+"""Wanted motion at a time since the start (s); None ends the run."""
+
+Observer = Callable[[SensorFrame, ControlOutput, TruthSample | None], None]
+
+
+@dataclass(kw_only=True, slots=True)
+class LoopHooks:
+    """What may watch a run.
+
+    Attributes:
+        recorder: writes the log.
+        truth: the simulator's truth, for the record only.
+        observers: called after every tick (live view, progress).
+    """
+
+    recorder: Recorder | None = None
+    truth: Callable[[], TruthSample] | None = None
+    observers: tuple[Observer, ...] = ()
+
+
+def run_loop(
+    robot: SafetySupervisor,
+    controller: Controller,
+    source: CommandSource,
+    hooks: LoopHooks,
+    config: dict[str, Any],
+) -> RunData:
+    """Run a controller on a robot until the source ends, the robot falls or someone stops it.
+
+    Args:
+        robot: the supervised robot.
+        controller: the controller.
+        source: wanted motion over time.
+        hooks: recorder, truth and observers.
+        config: everything resolved, for the record.
+    """
+    data = RunData(period=robot.period, config=config)
+    started = time.perf_counter()
+    with _interruptible() as interrupted:
+        try:
+            frame = robot.reset()
+            controller.reset()
+            data.stop_reason = _ticks(robot, controller, source, hooks, data, frame, interrupted)
+        finally:
+            robot.stop()
+    elapsed = time.perf_counter() - started
+    if data.frames and elapsed > 0.0:
+        data.real_time_factor = (data.frames[-1].time - data.frames[0].time) / elapsed
+    return data
+
+
+def _ticks(
+    robot: SafetySupervisor,
+    controller: Controller,
+    source: CommandSource,
+    hooks: LoopHooks,
+    data: RunData,
+    frame: SensorFrame,
+    interrupted: threading.Event,
+) -> str:
+    start = frame.time
+    wanted: MotionCommand | None = MotionCommand()
+    resting_since = stopping_since = float("inf")
+    while True:
+        now = frame.time - start
+        if interrupted.is_set():
+            resting_since = min(resting_since, now)
+            wanted = MotionCommand(mode=Mode.OFF)
+        else:
+            wanted = source(now)
+        if wanted is None:
+            return COMPLETED
+        motion = wanted
+        safety = robot.request
+        tick_start = time.perf_counter_ns()
+        try:
+            output = controller.step(frame, motion, safety)
+        except Exception as error:  # The boundary that keeps a robot standing when its controller breaks.
+            log.exception("the controller failed at %.2f s", frame.time)
+            _ramp_down(robot, frame)
+            return f"controller error: {type(error).__name__}: {error}"
+        tick_us = (time.perf_counter_ns() - tick_start) * 1e-3
+        output = replace(output, telemetry=replace(output.telemetry, tick_us=tick_us))
+        _record(data, hooks, frame, motion, safety, output)
+        frame = robot.step(output.command)
+        mode, limp = output.telemetry.mode, not bool(output.command.torque_limit.any())
+        if mode is Mode.SAFE:
+            stopping_since = min(stopping_since, now)
+            if limp and now - stopping_since >= AFTER_FALL:
+                return _safe_reason(data)
+        if interrupted.is_set() and (limp or now - resting_since > REST_TIMEOUT):
+            return INTERRUPTED
+
+
+def _record(
+    data: RunData,
+    hooks: LoopHooks,
+    frame: SensorFrame,
+    motion: MotionCommand,
+    safety: SafetyRequest,
+    output: ControlOutput,
+) -> None:
+    truth = hooks.truth() if hooks.truth is not None else None
+    data.frames.append(frame)
+    data.commands.append(CommandRecord(time=frame.time, motion=motion, safety=safety, joints=output.command))
+    data.telemetry.append(output.telemetry)
+    if truth is not None:
+        data.truth.append(truth)
+    if hooks.recorder is not None:
+        hooks.recorder.frame(frame)
+        hooks.recorder.command(motion, output.command, safety)
+        hooks.recorder.telemetry(output.telemetry)
+        if truth is not None:
+            hooks.recorder.truth(truth)
+    for observer in hooks.observers:
+        observer(frame, output, truth)
+
+
+def _ramp_down(robot: SafetySupervisor, frame: SensorFrame) -> None:
+    """Hold the present joints, and let the body sink as torque is taken away."""
+    steps = max(1, round(RAMP_DOWN / robot.period))
+    for step in range(steps):
+        limit = np.full(N_JOINTS, 1.0 - (step + 1) / steps)
+        robot.step(JointCommand(position=frame.joint_position, speed=np.zeros(N_JOINTS), torque_limit=limit))
+
+
+def _safe_reason(data: RunData) -> str:
+    for telemetry in data.telemetry:
+        for event in telemetry.events:
+            if "-> safe" in event:
+                return (
+                    f"stopped at {telemetry.time:.2f} s: {event.split('-> safe', 1)[1].strip() or 'unknown'}"
+                )
+    return "stopped"
+
+
+@contextmanager
+def _interruptible() -> Iterator[threading.Event]:
+    """Turn the first Ctrl-C (or a termination) into an event; a second one interrupts for real."""
+    event = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield event
+        return
+
+    def handle(number: int, stack: FrameType | None) -> None:
+        if event.is_set():
+            raise KeyboardInterrupt
+        event.set()
+
+    previous = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield event
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)

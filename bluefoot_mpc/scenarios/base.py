@@ -1,0 +1,91 @@
+"""What a scenario is: commands over time, a world, and criteria of success."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+from bluefoot_mpc.settings import require_positive
+from bluefoot_mpc.sim.config import SimConfig
+from bluefoot_mpc.types import MotionCommand
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ScenarioConfig:
+    """What every scenario can be told."""
+
+    duration: float = 20.0  # s, of the whole run
+
+    def __post_init__(self) -> None:
+        require_positive(duration=self.duration)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Criterion:
+    """One condition of success, and whether it holds.
+
+    Attributes:
+        name: what is asked, as a person would say it.
+        holds: True when it does.
+        detail: the figure that was seen.
+    """
+
+    name: str
+    holds: bool
+    detail: str
+
+
+class Scenario(ABC):
+    """Base class of scenarios: subclass it, give a name, a configuration and commands.
+
+    A scenario sees the time only: what it commands cannot depend on the
+    simulator's truth.
+    """
+
+    name: ClassVar[str]
+    Config: ClassVar[type[ScenarioConfig]] = ScenarioConfig
+
+    def __init__(self, config: Any = None) -> None:
+        self.config = config if config is not None else self.Config()
+
+    @abstractmethod
+    def command(self, time: float) -> MotionCommand:
+        """The wanted motion at `time` (s since the start)."""
+
+    def prepare(self, sim: SimConfig) -> SimConfig:
+        """The simulator's configuration for this scenario; by default unchanged."""
+        return sim
+
+    def criteria(self, summary: Mapping[str, Any]) -> list[Criterion]:
+        """The conditions of success, judged from the run's summary."""
+        return [not_fallen(summary)]
+
+    def source(self, time: float) -> MotionCommand | None:
+        """The command, or None when the scenario is over."""
+        return None if time >= self.config.duration else self.command(time)
+
+    @classmethod
+    def describe(cls) -> str:
+        """One line for lists: the first line of the class's docstring."""
+        return (cls.__doc__ or "").strip().splitlines()[0] if cls.__doc__ else ""
+
+    def with_duration(self, duration: float) -> Scenario:
+        """The same scenario with another duration (s)."""
+        return type(self)(replace(self.config, duration=duration))
+
+
+def not_fallen(summary: Mapping[str, Any]) -> Criterion:
+    """The robot did not fall and was not stopped."""
+    reason = str(summary["stop_reason"])
+    holds = not summary["fell"] and reason == "completed"
+    return Criterion(name="stays on its feet", holds=holds, detail="yes" if holds else reason)
+
+
+def at_most(summary: Mapping[str, Any], key: str, limit: float, name: str, unit: str) -> Criterion:
+    """A figure of the summary is at most `limit`; a missing one does not hold."""
+    value = summary.get(key)
+    holds = value is not None and value <= limit
+    shown = "unknown" if value is None else f"{value:.2f} {unit}"
+    return Criterion(name=f"{name} at most {limit:g} {unit}", holds=holds, detail=shown)

@@ -1,0 +1,142 @@
+"""From options, a configuration file and overrides to one resolved configuration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.io.safety import SafetyConfig
+from bluefoot_mpc.model.parameters import RobotParameters, load_parameters
+from bluefoot_mpc.scenarios.base import Scenario
+from bluefoot_mpc.scenarios.options import RunOptions
+from bluefoot_mpc.settings import build, merge, parse_override, read_toml, to_table
+from bluefoot_mpc.sim.config import SimConfig
+
+SCENARIO_OPTIONS = {
+    "duration": "duration", "gait": "gait", "speed": "speed", "lateral_speed": "lateral_speed",
+    "yaw_rate": "yaw_rate", "impulse": "impulse", "direction": "direction", "push_time": "push_time",
+}  # fmt: skip
+"""Options that fill a field of the scenario's configuration, where it has that field."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RunSection:
+    """What is run."""
+
+    scenario: str
+    seed: int = 0
+    robot: str = "sim"
+    controller: str = "cpg"
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StageConfig:
+    """Configuration of everything but the scenario and the robot's body."""
+
+    sim: SimConfig = field(default_factory=SimConfig)
+    safety: SafetyConfig = field(default_factory=SafetyConfig)
+    control: ControlConfig = field(default_factory=ControlConfig)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Resolved:
+    """A run's whole configuration, checked.
+
+    Attributes:
+        run: what is run.
+        scenario: the scenario with its configuration.
+        stages: simulator, supervisor and controller.
+        parameters: the robot's body.
+    """
+
+    run: RunSection
+    scenario: Scenario
+    stages: StageConfig
+    parameters: RobotParameters
+
+    def table(self) -> dict[str, Any]:
+        """Everything as one nested table, for ``config.toml``, the log and the hash."""
+        return {
+            "run": to_table(self.run),
+            "scenario": to_table(self.scenario.config),
+            **to_table(self.stages),
+            "model": to_table(self.parameters),
+        }
+
+
+def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
+    """Put defaults, the configuration file, overrides and options together, in rising rank.
+
+    Raises:
+        ConfigurationError: a key is unknown, or a value impossible.
+    """
+    table = read_toml(options.config) if options.config is not None else {}
+    for override in options.overrides:
+        table = merge(table, parse_override(override))
+    table = _without_run(table)
+    stage_names = [f.name for f in fields(StageConfig)]
+    for key in table:
+        if key not in (*stage_names, "scenario", "model"):
+            raise UnknownNameError("configuration section", key, (*stage_names, "scenario", "model"))
+    scenario_table = merge(table.get("scenario", {}), _scenario_options(scenario, options))
+    made = scenario(build(scenario.Config, scenario_table, "scenario"))
+    stages = build(StageConfig, {key: table[key] for key in stage_names if key in table})
+    sim = build(SimConfig, merge(to_table(stages.sim), _sim_options(options)), "sim")
+    return Resolved(
+        run=RunSection(
+            scenario=scenario.name, seed=options.seed, robot=options.robot, controller=options.controller
+        ),
+        scenario=made,
+        stages=StageConfig(sim=made.prepare(sim), safety=stages.safety, control=stages.control),
+        parameters=_parameters(table, options),
+    )
+
+
+def _without_run(table: dict[str, Any]) -> dict[str, Any]:
+    # A resolved config.toml of an earlier run may be given back; what is run
+    # comes from the command line.
+    return {key: value for key, value in table.items() if key != "run"}
+
+
+def _parameters(table: dict[str, Any], options: RunOptions) -> RobotParameters:
+    base = load_parameters(options.model)
+    if "model" not in table:
+        return base
+    return build(RobotParameters, merge(to_table(base), table["model"]), "model")
+
+
+def _scenario_options(scenario: type[Scenario], options: RunOptions) -> dict[str, Any]:
+    known = {f.name for f in fields(scenario.Config)}
+    values: dict[str, Any] = {}
+    for option, key in SCENARIO_OPTIONS.items():
+        value = getattr(options, option)
+        if value is None:
+            continue
+        if key not in known:
+            usable = ", ".join(f"--{name.replace('_', '-')}" for name in SCENARIO_OPTIONS if name in known)
+            raise ConfigurationError(
+                f"scenario '{scenario.name}' has no option --{option.replace('_', '-')}; it takes: {usable}"
+            )
+        values[key] = value
+    return values
+
+
+def _sim_options(options: RunOptions) -> dict[str, Any]:
+    world: dict[str, Any] = {}
+    if options.world is not None:
+        world["name"] = options.world
+    if options.friction is not None:
+        world["friction"] = options.friction
+    if options.slope is not None:
+        world["slope_deg"] = options.slope
+    if options.payload is not None:
+        if options.payload[0] < 0.0 or not math.isfinite(options.payload[0]):
+            raise ConfigurationError(f"--payload mass = {options.payload[0]} kg must not be negative")
+        world["payload"] = list(options.payload)
+    table: dict[str, Any] = {"world": world} if world else {}
+    if options.randomize != "none":
+        table["randomization"] = {"preset": options.randomize}
+    return table

@@ -1,0 +1,98 @@
+"""Scenarios with all feet planted: standing, and posing the trunk."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bluefoot_mpc.scenarios.base import Criterion, Scenario, ScenarioConfig, at_most, not_fallen
+from bluefoot_mpc.settings import require_nonnegative, require_positive
+from bluefoot_mpc.types import FloatArray, MotionCommand, TrunkPose
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StandConfig(ScenarioConfig):
+    """Standing still."""
+
+    duration: float = 10.0  # s
+
+
+class Stand(Scenario):
+    """Stand still on all feet."""
+
+    name = "stand"
+    Config = StandConfig
+
+    def command(self, time: float) -> MotionCommand:
+        """Stand."""
+        return MotionCommand()
+
+    def criteria(self, summary: Mapping[str, Any]) -> list[Criterion]:
+        """On its feet and level."""
+        return [
+            not_fallen(summary),
+            at_most(summary, "roll_peak_deg", 2.0, "roll", "deg"),
+            at_most(summary, "pitch_peak_deg", 2.0, "pitch", "deg"),
+        ]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PoseConfig(ScenarioConfig):
+    """How far the trunk moves along and about each axis, one after the other."""
+
+    duration: float = 42.0  # s
+    stand_time: float = 2.0  # s before the first pose
+    forward: float = 0.05  # m, ±
+    sideways: float = 0.05  # m, ±
+    height: float = 0.025  # m, ±
+    roll_deg: float = 15.0  # ±
+    pitch_deg: float = 15.0  # ±
+    yaw_deg: float = 15.0  # ±
+
+    def __post_init__(self) -> None:
+        ScenarioConfig.__post_init__(self)
+        require_positive(duration=self.duration)
+        require_nonnegative(
+            stand_time=self.stand_time, forward=self.forward, sideways=self.sideways, height=self.height,
+            roll_deg=self.roll_deg, pitch_deg=self.pitch_deg, yaw_deg=self.yaw_deg,
+        )  # fmt: skip
+
+    def amplitudes(self) -> FloatArray:
+        """(6,) m and rad: x, y, z, roll, pitch, yaw."""
+        angles = np.radians([self.roll_deg, self.pitch_deg, self.yaw_deg])
+        return np.array([self.forward, self.sideways, self.height, *angles])
+
+
+class Pose(Scenario):
+    """Move the trunk through its range of motion over planted feet."""
+
+    name = "pose"
+    Config = PoseConfig
+
+    def command(self, time: float) -> MotionCommand:
+        """One sine per axis, one axis after the other."""
+        config = self.config
+        share = (time - config.stand_time) / max(1e-9, config.duration - config.stand_time)
+        if share < 0.0:
+            return MotionCommand()
+        axis, within = divmod(share * 6.0, 1.0)
+        offset = np.zeros(6)
+        offset[min(5, int(axis))] = math.sin(2.0 * math.pi * within)
+        offset *= config.amplitudes()
+        return MotionCommand(trunk=TrunkPose(position=offset[:3], rpy=offset[3:]))
+
+    def criteria(self, summary: Mapping[str, Any]) -> list[Criterion]:
+        """On its feet, the trunk where it was commanded."""
+        return [
+            not_fallen(summary),
+            at_most(summary, "roll_rms_deg", TRACKING_DEG, "roll error RMS", "deg"),
+            at_most(summary, "pitch_rms_deg", TRACKING_DEG, "pitch error RMS", "deg"),
+        ]
+
+
+TRACKING_DEG = 2.5
+"""RMS error of the trunk's angles while it follows a slow sine through soft servos."""

@@ -1,0 +1,74 @@
+"""The robot's mass lumped into points: trunk, joints, link midpoints and feet.
+
+The placement law of the paper (thesis, section on ZMP body placement) sees a leg as point masses
+at its four joints, its four link midpoints and its foot. Each part of the mass
+budget goes to the nearest of the three points of its link.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bluefoot_mpc.model.parameters import RobotParameters
+from bluefoot_mpc.types import FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class MassPoints:
+    """Lumped masses of the trunk and of one leg.
+
+    Attributes:
+        trunk: kg.
+        trunk_com: (3,) m, the trunk's centre of mass in the base frame.
+        joint: (4,) kg at hip_yaw, hip_pitch, knee, ankle.
+        link: (4,) kg at the link midpoints.
+        foot: kg.
+    """
+
+    trunk: float
+    trunk_com: FloatArray
+    joint: FloatArray
+    link: FloatArray
+    foot: float
+
+    @property
+    def leg_weights(self) -> FloatArray:
+        """(5, 1) kg: the leg's masses spread over its joints and foot.
+
+        A link midpoint weighs half on either end, so that
+        ``weights.T @ points`` with the five points of a leg is the leg's first moment.
+        """
+        weights = np.zeros(5)
+        weights[:4] += self.joint + 0.5 * self.link
+        weights[1:] += 0.5 * self.link
+        weights[4] += self.foot
+        return weights
+
+    @property
+    def total(self) -> float:
+        """Mass of the trunk and all four legs, kg."""
+        return self.trunk + 4.0 * float(self.joint.sum() + self.link.sum() + self.foot)
+
+
+def lump(parameters: RobotParameters) -> MassPoints:
+    """Lump a robot's mass budget."""
+    joint, link, foot = np.zeros(4), np.zeros(4), 0.0
+    trunk_parts = [part for part in parameters.parts if part.body == "trunk"]
+    trunk = sum(part.mass for part in trunk_parts)
+    trunk_com = sum(part.mass * np.array(part.position) for part in trunk_parts) / trunk
+    for part in parameters.parts:
+        if part.body == "trunk":
+            continue
+        index = int(part.body[-1]) - 1
+        share = part.position[0] / parameters.legs.link_lengths[index]
+        if share < 0.25:
+            joint[index] += part.mass
+        elif share <= 0.75:
+            link[index] += part.mass
+        elif index < 3:
+            joint[index + 1] += part.mass
+        else:
+            foot += part.mass
+    return MassPoints(trunk=trunk, trunk_com=trunk_com, joint=joint, link=link, foot=foot)
