@@ -34,7 +34,8 @@ HEAD_PARTS = ("head", "lidar", "camera")
 
 Triple = tuple[float, float, float]
 
-_LYING = (0.0, 0.5 * math.pi, 0.0)
+_LYING = (0.0, 0.5 * math.pi, 0.0)  # z of the shape along x of the link
+_ACROSS = (0.5 * math.pi, 0.0, 0.0)  # along y
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -58,9 +59,15 @@ class Shape:
     material: str = ""
 
 
-def visual_shapes(prefix: str, parts: Sequence[Part]) -> list[Shape]:
-    """Shapes to draw for the parts of one link; names start with `prefix`."""
-    return [shape for part in parts for shape in _draw(f"{prefix}_{part.name}", part)]
+def visual_shapes(prefix: str, parts: Sequence[Part], reach: float | None = None) -> list[Shape]:
+    """Shapes to draw for the parts of one link.
+
+    Args:
+        prefix: what the names start with.
+        parts: of that link.
+        reach: m, where along x the next joint is; ``None`` in the trunk.
+    """
+    return [shape for part in parts for shape in _draw(f"{prefix}_{part.name}", part, reach)]
 
 
 def trunk_collisions(parameters: RobotParameters) -> list[Shape]:
@@ -114,7 +121,7 @@ def _half_extent(part: Part) -> tuple[float, float, float]:
     return (half, radius, radius) if part.shape == "cylinder_x" else (radius, radius, half)
 
 
-def _draw(name: str, part: Part) -> list[Shape]:
+def _draw(name: str, part: Part, reach: float | None) -> list[Shape]:
     """One part as it looks: its solid in the material of its kind, with details."""
     kind = part.name.split("_")[0]
     if kind == "chassis" and part.shape == "box":
@@ -124,7 +131,7 @@ def _draw(name: str, part: Part) -> list[Shape]:
     if kind == "camera" and part.shape == "box":
         return _camera(name, part)
     if kind == "servo" and part.shape == "box":
-        return _servo(name, part)
+        return _servo(name, part, reach)
     material = {
         "chassis": "shell", "head": "shell", "battery": "battery", "electronics": "electronics",
         "servo": "servo", "foot": "rubber", "shank": "panel", "lidar": "sensor", "camera": "panel",
@@ -170,12 +177,14 @@ def _camera(name: str, part: Part) -> list[Shape]:
     ]
 
 
-def _servo(name: str, part: Part) -> list[Shape]:
-    """A servo block with an output horn on both sides of its shaft: z in the trunk, y at a link."""
-    along_z = part.body == "trunk"
-    size = (0.3 * min(part.size), part.size[2 if along_z else 1] + 0.006)
-    rpy = (0.0, 0.0, 0.0) if along_z else (0.5 * math.pi, 0.0, 0.0)
-    return [_solid(name, part, "servo"), _rod(f"{name}_horn", size, part.position, "horn", rpy)]
+def _servo(name: str, part: Part, reach: float | None) -> list[Shape]:
+    """A servo block with a horn on both sides of its shaft: upright in the trunk, across at a link."""
+    x, y, z = part.position
+    if reach is None:
+        size, position, rpy = (0.3 * min(part.size), part.size[2] + 0.006), (x, y, z), (0.0, 0.0, 0.0)
+    else:
+        size, position, rpy = (0.3 * min(part.size), part.size[1] + 0.006), (reach, y, z), _ACROSS
+    return [_solid(name, part, "servo"), _rod(f"{name}_horn", size, position, "horn", rpy)]
 
 
 def _box(name: str, size: Triple, position: Triple, material: str) -> Shape:

@@ -67,10 +67,13 @@ def _add_leg(robot: ET.Element, parameters: RobotParameters, leg: str, azimuth: 
     ends = [(length, 0.0, 0.0) for length in legs.link_lengths]
     parent = "trunk"
     for index, joint in enumerate(LEG_JOINTS):
-        link = f"{leg}_link{index + 1}"
+        body = f"link{index + 1}"
+        link = f"{leg}_{body}"
         element = ET.SubElement(robot, "joint", name=f"{leg}_{joint}", type="revolute")
-        rpy = (0.0, 0.0, azimuth) if index == 0 else (0.0, 0.0, 0.0)
-        _add_origin(element, hip if index == 0 else ends[index - 1], rpy)
+        if index == 0:
+            _add_origin(element, hip, (0.0, 0.0, azimuth))
+        else:
+            _add_origin(element, ends[index - 1])
         ET.SubElement(element, "parent", link=parent)
         ET.SubElement(element, "child", link=link)
         ET.SubElement(element, "axis", xyz=_numbers(_AXES[joint]))
@@ -78,11 +81,9 @@ def _add_leg(robot: ET.Element, parameters: RobotParameters, leg: str, azimuth: 
             element, "limit", lower=_number(lower[index]), upper=_number(upper[index]),
             effort=_number(servo.stall_torque), velocity=_number(servo.no_load_speed),
         )  # fmt: skip
-        body = f"link{index + 1}"
         parts = [part for part in parameters.parts if part.body == body]
-        _add_link(
-            robot, link, compose(parts), visual_shapes(link, parts), link_collisions(parameters, leg, body)
-        )
+        visuals = visual_shapes(link, parts, legs.link_lengths[index])
+        _add_link(robot, link, compose(parts), visuals, link_collisions(parameters, leg, body))
         parent = link
     foot = ET.SubElement(robot, "joint", name=f"{leg}_foot_mount", type="fixed")
     _add_origin(foot, ends[-1])
