@@ -1,5 +1,14 @@
-"""Kinematics of the legs: positions, Jacobians, inverse and ankle direction."""
+"""Kinematics of the legs: positions, Jacobians, inverse, ankle direction and velocities."""
 
+from bluefoot_mpc.model.legs.ankle import (
+    AnkleConfig,
+    AnklePolicy,
+    ankle_directions,
+    ground_directions,
+    limit_margin,
+    widest_directions,
+    widest_margin,
+)
 from bluefoot_mpc.model.legs.forward import (
     feet_in_base,
     foot_jacobians_in_base,
@@ -16,19 +25,30 @@ from bluefoot_mpc.model.legs.inverse import (
     inverse_in_leg,
     limit_violations,
 )
+from bluefoot_mpc.model.legs.velocity import damped_inverse, foot_velocities_in_world, joint_velocities
 
 __all__ = [
     "ALL_LEGS",
+    "AnkleConfig",
+    "AnklePolicy",
     "IkResult",
     "LegGeometry",
     "LimitViolation",
+    "ankle_directions",
+    "damped_inverse",
     "feet_in_base",
     "foot_jacobians_in_base",
+    "foot_velocities_in_world",
+    "ground_directions",
     "inverse",
     "inverse_in_leg",
     "joint_positions_in_base",
+    "joint_velocities",
     "leg_jacobian",
+    "limit_margin",
     "limit_violations",
     "link_midpoints",
     "to_leg_frame",
+    "widest_directions",
+    "widest_margin",
 ]
