@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.runtime.versions import installed_versions
 from bluefoot_mpc.types import (
     FloatArray,
     JointCommand,
@@ -65,6 +66,7 @@ class RunData:
             what was run: ``scenario, seed, robot, controller``.
         stop_reason: one sentence; ``"completed"`` when the run reached its end.
         real_time_factor: simulated time over wall time; None where unknown.
+        versions: of this package and what it ran on.
     """
 
     frames: list[SensorFrame] = field(default_factory=list)
@@ -75,6 +77,7 @@ class RunData:
     config: dict[str, Any] = field(default_factory=dict)
     stop_reason: str = COMPLETED
     real_time_factor: float | None = None
+    versions: dict[str, str] = field(default_factory=installed_versions)
 
     def records(self, topic: str) -> list[Any]:
         """The list of records of a topic, with or without its leading slash.

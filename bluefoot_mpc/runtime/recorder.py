@@ -1,0 +1,209 @@
+"""Writes a run to an MCAP file while it happens.
+
+One topic per kind of record and one for the configuration, as JSON with a
+schema, so that Foxglove opens the file as it is. The control tick pays for
+the text only; packing and compressing happen in a thread, half a second of
+the run at a time, and every packed half second goes to the file at once. So a
+killed process loses little, and `bluefoot_mpc.runtime.log.read_log` reads what
+is there.
+"""
+
+from __future__ import annotations
+
+import atexit
+import queue
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any
+
+import orjson
+from mcap.writer import CompressionType, Writer
+
+from bluefoot_mpc.exceptions import LogError
+from bluefoot_mpc.runtime.codec import encode
+from bluefoot_mpc.runtime.data import CommandRecord
+from bluefoot_mpc.runtime.schema import json_schema
+from bluefoot_mpc.runtime.versions import installed_versions
+from bluefoot_mpc.types import (
+    JointCommand,
+    MotionCommand,
+    SafetyRequest,
+    SensorFrame,
+    Telemetry,
+    TruthSample,
+)
+
+LIBRARY = "bluefoot_mpc"
+"""Start of the library name in the file's header; tells our logs from other MCAP files."""
+RECORD_CLASSES: dict[str, type] = {
+    "/frame": SensorFrame,
+    "/command": CommandRecord,
+    "/telemetry": Telemetry,
+    "/truth": TruthSample,
+}
+CONFIG_TOPIC = "/config"
+START, OUTCOME = "start", "outcome"
+"""Names of the MCAP metadata that hold period and versions, and how the run ended."""
+
+BATCH = 0.5
+"""s of the run that are packed together; what a killed process may lose."""
+_QUEUE_LENGTH = 64
+
+_Message = tuple[int, int, bytes]
+
+
+class Recorder:
+    """Records one run; use it as a context manager, so that the file is always completed.
+
+    Args:
+        path: the file to write; its folder is made if needed.
+        config: everything resolved, as a nested table of plain values.
+        period: s, command period; None lets the reader work it out from the frames.
+
+    Raises:
+        LogError: the file cannot be written, now or at any later call.
+        TypeError: the configuration holds something that JSON cannot.
+    """
+
+    def __init__(self, path: str | Path, config: Mapping[str, Any], period: float | None = None) -> None:
+        self.path = Path(path)
+        self._config: bytes | None = orjson.dumps(dict(config))
+        self._outcome: dict[str, str] = {}
+        self._error: OSError | None = None
+        self._closed = False
+        self._time: float | None = None
+        self._batch_end = float("-inf")
+        self._batch: list[_Message] = []
+        self._queue: queue.Queue[list[_Message] | None] = queue.Queue(_QUEUE_LENGTH)
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._file: IO[bytes] = self.path.open("wb")
+            self._writer = _start_writer(self._file, period)
+        except OSError as error:
+            raise self._failure(error) from error
+        self._channels = _register(self._writer)
+        # A daemon thread with an exit handler completes the file even where nobody closes it.
+        self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
+        self._thread.start()
+        atexit.register(self.close)
+
+    def frame(self, frame: SensorFrame) -> None:
+        """Record a sensor frame; its time is that of the records that follow."""
+        self._time = frame.time
+        if self._config is not None:
+            self._put(CONFIG_TOPIC, frame.time, self._config)
+            self._config = None
+        elif frame.time >= self._batch_end or frame.time < self._batch_end - 2.0 * BATCH:
+            self._hand_over()
+            self._batch_end = frame.time + BATCH
+        self._put("/frame", frame.time, encode(frame))
+
+    def command(self, motion: MotionCommand, joints: JointCommand, safe: SafetyRequest) -> None:
+        """Record what went into the controller beside the newest frame, and its answer.
+
+        Raises:
+            LogError: no frame was recorded yet.
+        """
+        if self._time is None:
+            raise LogError("a command was recorded before any frame")
+        record = CommandRecord(time=self._time, motion=motion, safety=safe, joints=joints)
+        self._put("/command", record.time, encode(record))
+
+    def telemetry(self, telemetry: Telemetry) -> None:
+        """Record the controller's account of a tick."""
+        self._put("/telemetry", telemetry.time, encode(telemetry))
+
+    def truth(self, sample: TruthSample) -> None:
+        """Record the simulator's truth."""
+        self._put("/truth", sample.time, encode(sample))
+
+    def finish(self, stop_reason: str, real_time_factor: float | None = None) -> None:
+        """Say how the run ended; goes into the file when it is closed."""
+        self._outcome["stop_reason"] = stop_reason
+        if real_time_factor is not None:
+            self._outcome["real_time_factor"] = repr(float(real_time_factor))
+
+    def close(self) -> None:
+        """Write what is left and complete the file. Idempotent.
+
+        Raises:
+            LogError: something could not be written.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        atexit.unregister(self.close)
+        if self._config is not None:
+            self._batch.append((self._channels[CONFIG_TOPIC], 0, self._config))
+        self._queue.put(self._batch)
+        self._queue.put(None)
+        self._thread.join()
+        try:
+            with self._file:
+                if self._error is None:
+                    if self._outcome:
+                        self._writer.flush()
+                        self._writer.add_metadata(OUTCOME, self._outcome)
+                    self._writer.finish()
+        except OSError as error:
+            self._error = self._error or error
+        if self._error is not None:
+            raise self._failure(self._error)
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is not None and not self._outcome:
+            self.finish(f"{type(error).__name__}: {error}".rstrip(": "))
+        self.close()
+
+    def _put(self, topic: str, time: float, data: bytes) -> None:
+        if self._error is not None:
+            raise self._failure(self._error)
+        self._batch.append((self._channels[topic], max(0, round(time * 1e9)), data))
+
+    def _hand_over(self) -> None:
+        # Blocks when the disk cannot follow: late is better than lost.
+        self._queue.put(self._batch)
+        self._batch = []
+
+    def _work(self) -> None:
+        while (batch := self._queue.get()) is not None:
+            if self._error is not None:
+                continue
+            try:
+                for channel, time, data in batch:
+                    self._writer.add_message(channel, time, data, time)
+                self._writer.flush()
+            except OSError as error:
+                self._error = error
+
+    def _failure(self, error: OSError) -> LogError:
+        return LogError(f"cannot write the log {self.path}: {error.strerror or error}")
+
+
+def _start_writer(file: IO[bytes], period: float | None) -> Any:
+    versions = installed_versions()
+    # Chunks end where the batches end, not at a size.
+    writer: Any = Writer(file, chunk_size=1 << 30, compression=CompressionType.ZSTD)
+    writer.start(library=f"{LIBRARY} {versions.get('bluefoot-mpc', '')}".strip())
+    start = {} if period is None else {"period": repr(float(period))}
+    writer.add_metadata(START, {**start, "versions": orjson.dumps(versions).decode()})
+    file.flush()
+    return writer
+
+
+def _register(writer: Any) -> dict[str, int]:
+    schemas = {topic: (cls.__name__, json_schema(cls)) for topic, cls in RECORD_CLASSES.items()}
+    schemas[CONFIG_TOPIC] = ("Config", {"type": "object", "properties": {}})
+    return {
+        topic: writer.register_channel(
+            topic, "json", writer.register_schema(f"bluefoot.{name}", "jsonschema", orjson.dumps(schema))
+        )
+        for topic, (name, schema) in schemas.items()
+    }
