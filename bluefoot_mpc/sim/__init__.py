@@ -1,0 +1,1 @@
+"""Simulator: MuJoCo physics, servos, sensors and worlds behind the robot interface."""

@@ -1,0 +1,263 @@
+"""The simulated robot behind the robot interface."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import mujoco
+import numpy as np
+
+from bluefoot_mpc.model.robot import RobotModel
+from bluefoot_mpc.sim.config import SimConfig
+from bluefoot_mpc.sim.randomization import draw
+from bluefoot_mpc.sim.sensors import FootSwitches, Imu, ServoSensors
+from bluefoot_mpc.sim.servo import BankConfig, Plant, ServoBank
+from bluefoot_mpc.sim.terrain import Ground
+from bluefoot_mpc.sim.truth import TruthReader
+from bluefoot_mpc.sim.world import World, build_world
+from bluefoot_mpc.types import N_JOINTS, N_LEGS, FloatArray, JointCommand, SensorFrame, TruthSample
+
+_SENSORS_OFF = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+_NEVER = 1 << 62
+
+
+class SimRobot:
+    """BlueFoot in MuJoCo: servos, sensors and battery as the hardware has them.
+
+    It starts standing in its default stance, at rest. The same seed and commands
+    give the same frames, bit for bit.
+
+    Attributes:
+        period: s, command period.
+        drawn: what randomisation made of this run, for a log.
+        discarded_commands: how many commands were not finite and therefore ignored.
+    """
+
+    def __init__(self, robot: RobotModel, config: SimConfig, seed: int = 0) -> None:
+        self.config = config
+        self.period = config.command_period
+        drawn = draw(config, seed)
+        self.drawn = drawn.as_dict()
+        self._robot = robot
+        self._world = build_world(robot, config, drawn)
+        self._steps = round(config.command_period / config.physics_period)
+        self._imu_steps = round(config.sensors.imu_period / config.physics_period)
+        self._latency = round(drawn.latency / config.physics_period)
+        self._bank = ServoBank(
+            BankConfig(
+                servo=robot.parameters.servo,
+                battery=robot.parameters.battery,
+                gain=drawn.servo_gain,
+                friction_scale=drawn.servo_friction,
+                open_voltage=drawn.voltage,
+                standby_current=config.standby_current,
+                backlash=_backlash(robot, config),
+                load_friction_speed=config.load_friction_speed,
+                period=config.physics_period,
+            ),
+            _plant(self._world),
+        )
+        self._imu = Imu(config.sensors, seed)
+        self._switches = FootSwitches(config.sensors, seed)
+        self._reports = ServoSensors(config.sensors, robot.parameters.servo, seed)
+        self._ground = Ground(config.world, self._world.model, self._world.data)
+        self._truth = TruthReader(self._world, self._ground, robot.parameters.legs.foot_radius)
+        self._samples = np.zeros((self._steps // self._imu_steps + 1, 21))
+        self._commands: deque[tuple[int, JointCommand]] = deque()
+        self._pushes: list[tuple[int, int, FloatArray]] = []
+        self._frame = self.reset()
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model, for viewers."""
+        return self._world.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's state, for viewers. Do not write to it."""
+        return self._world.data
+
+    @property
+    def ground(self) -> Ground:
+        """Height of the ground anywhere."""
+        return self._ground
+
+    @property
+    def overheated(self) -> tuple[str, ...]:
+        """Names of the servos that switched off by heat."""
+        return self._bank.overheated
+
+    def reset(self) -> SensorFrame:
+        """Stand in the default stance at time zero: the state after construction, bit for bit."""
+        self._commands.clear()
+        self._pushes = []
+        self._force = np.zeros(3)
+        self.discarded_commands = 0
+        self._place()
+        for part in (self._bank, self._imu, self._switches, self._reports):
+            part.reset()
+        self._bank.hold(self._robot.stance_joints)
+        # Standing still is simulated before time zero, the last command period with sensors.
+        settle = max(1, math.ceil(self.config.settle_time / self.config.command_period)) * self._steps
+        self._step = -settle
+        self._next_event = _NEVER
+        while self._step < 0:
+            self._bank.cool()
+            self._frame = self._run_frame()
+        self._world.data.time = 0.0
+        self._bank.cool()
+        for push in self.config.pushes:
+            self._add_push(push.time, np.array(push.force), push.duration)
+        return self._frame
+
+    def step(self, command: JointCommand) -> SensorFrame:
+        """Send a command, let one command period pass, return the next frame.
+
+        A command that is not finite is discarded, as the bus driver does.
+        """
+        if (
+            np.isfinite(command.position).all()
+            and np.isfinite(command.speed).all()
+            and np.isfinite(command.torque_limit).all()
+        ):
+            self._commands.append((self._step + self._latency, command))
+            self._next_event = min(self._next_event, self._step + self._latency)
+        else:
+            self.discarded_commands += 1
+        self._frame = self._run_frame()
+        return self._frame
+
+    def stop(self) -> None:
+        """Switch every servo's torque off at once. Idempotent."""
+        self._commands.clear()
+        limp = JointCommand(
+            position=self._frame.joint_position, speed=np.zeros(N_JOINTS), torque_limit=np.zeros(N_JOINTS)
+        )
+        self._bank.write(limp)
+
+    def close(self) -> None:
+        """Nothing to give back; the memory goes with the object."""
+
+    def truth(self) -> TruthSample:
+        """The true state at the last frame: for reports, never for a controller."""
+        return self._truth.read(self._step * self.config.physics_period, self._bank, self._force)
+
+    def apply_push(self, force: FloatArray, duration: float) -> None:
+        """Push the trunk's origin from now on.
+
+        Args:
+            force: (3,) N, world axes.
+            duration: s.
+        """
+        self._add_push(self._step * self.config.physics_period, np.asarray(force, dtype=np.float64), duration)
+
+    def _add_push(self, time: float, force: FloatArray, duration: float) -> None:
+        start = max(self._step, round(time / self.config.physics_period))
+        stop = start + max(1, round(duration / self.config.physics_period))
+        self._pushes.append((start, stop, force))
+        self._next_event = min(self._next_event, start)
+
+    def _place(self) -> None:
+        """Put the robot on the ground at the origin, aligned with the slope."""
+        world, model, data = self._world, self._world.model, self._world.data
+        mujoco.mj_resetData(model, data)
+        stance = self._robot.default_stance()
+        slope, height = self.config.world.slope, float(stance[2])
+        pose = data.qpos[world.q : world.q + 23]
+        pose[0:3] = (-math.sin(slope) * height, 0.0, math.cos(slope) * height)
+        pose[3:7] = (math.cos(0.5 * slope), 0.0, -math.sin(0.5 * slope), 0.0)
+        pose[7:] = stance[7:]
+
+    def _run_frame(self) -> SensorFrame:
+        """Physics of one command period, then what the sensors say of it."""
+        self._truth.start_frame()
+        times = self._advance()
+        dt, now = self.config.physics_period, self._step * self.config.physics_period
+        count = len(times)
+        samples = self._samples[:count].copy()
+        duty, power, voltage = self._bank.finish_frame(self._steps)
+        self._truth.power = power
+        position, speed, load = self._reports.measure(self._bank.plant.position, duty, self._steps * dt)
+        force = np.sqrt(np.square(samples[:, 9:].reshape(count, N_LEGS, 3)).sum(axis=2))
+        contact, contact_time = self._switches.measure(times, force, now)
+        return SensorFrame(
+            time=now,
+            joint_position=position,
+            joint_speed=speed,
+            joint_load=load,
+            joint_temperature=np.rint(self._bank.temperature),
+            joint_time=np.full(N_JOINTS, now),
+            joint_valid=np.ones(N_JOINTS, dtype=np.bool_),
+            voltage=round(voltage, 1),
+            voltage_valid=True,
+            imu=self._imu.measure(np.array(times), samples[:, :9]),
+            contact=contact,
+            contact_time=np.full(N_LEGS, contact_time),
+            contact_valid=np.ones(N_LEGS, dtype=np.bool_),
+        )
+
+    def _advance(self) -> list[float]:
+        """The physics steps of one frame.
+
+        Sensors are evaluated in the steps that end on the IMU's period, so their
+        samples are one physics step old.
+
+        Returns:
+            Times of the samples in the first rows of the sample buffer, s.
+        """
+        model, data, world = self._world.model, self._world.data, self._world
+        option, advance, mj_step = model.opt, self._bank.advance, mujoco.mj_step
+        sensed = data.sensordata[world.sensor : world.sensor + 21]
+        flags = option.disableflags & ~_SENSORS_OFF
+        times: list[float] = []
+        option.disableflags = flags | _SENSORS_OFF
+        period = self._imu_steps
+        for step in range(self._step, self._step + self._steps):
+            if step >= self._next_event:
+                self._handle_events(step)
+            advance()
+            if (step + 1) % period:
+                mj_step(model, data)
+                continue
+            option.disableflags = flags
+            mj_step(model, data)
+            option.disableflags = flags | _SENSORS_OFF
+            self._samples[len(times)] = sensed
+            self._truth.look_for_contacts()
+            times.append(step * self.config.physics_period)
+        self._step += self._steps
+        return times
+
+    def _handle_events(self, step: int) -> None:
+        """Deliver the commands that have arrived and switch pushes on and off."""
+        commands = self._commands
+        while commands and commands[0][0] <= step:
+            self._bank.write(commands.popleft()[1])
+        active = [push for push in self._pushes if push[0] <= step < push[1]]
+        self._pushes = [push for push in self._pushes if step < push[1]]
+        self._force = np.sum([push[2] for push in active], axis=0) if active else np.zeros(3)
+        # The free joint's first three forces act on the trunk's origin, in world axes.
+        v = self._world.v
+        self._world.data.qfrc_applied[v : v + 3] = self._force
+        ahead = [edge for push in self._pushes for edge in push[:2] if edge > step]
+        if commands:
+            ahead.append(commands[0][0])
+        self._next_event = min(ahead, default=_NEVER)
+
+
+def _backlash(robot: RobotModel, config: SimConfig) -> float:
+    degrees = robot.parameters.servo.backlash_deg if config.backlash_deg is None else config.backlash_deg
+    return math.radians(degrees)
+
+
+def _plant(world: World) -> Plant:
+    data, model = world.data, world.model
+    q, v = world.q + 7, world.v + 6
+    return Plant(
+        position=data.qpos[q : q + N_JOINTS],
+        speed=data.qvel[v : v + N_JOINTS],
+        drive=data.ctrl[world.ctrl : world.ctrl + N_JOINTS],
+        friction=model.dof_frictionloss[v : v + N_JOINTS],
+        damping=model.dof_damping[v : v + N_JOINTS],
+    )

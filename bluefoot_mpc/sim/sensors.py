@@ -1,0 +1,157 @@
+"""Sensors of the simulated robot: what the truth looks like to the robot.
+
+Every sensor draws from a stream of its own, so that changing one leaves the
+others' errors as they were. Error sizes are assumptions: see `SensorConfig`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from bluefoot_mpc.model.parameters import ServoParameters
+from bluefoot_mpc.model.servo import SPEED_UNIT
+from bluefoot_mpc.sim.config import SensorConfig
+from bluefoot_mpc.sim.randomization import stream
+from bluefoot_mpc.types import N_JOINTS, N_LEGS, BoolArray, FloatArray, ImuBatch
+
+_MINUTE = 60.0
+_BITS = np.array([1, 2, 4, 8])
+
+
+class Imu:
+    """Gyro, accelerometer and magnetometer with white noise, bias and drift."""
+
+    def __init__(self, config: SensorConfig, seed: int) -> None:
+        self._config, self._seed = config, seed
+        self.reset()
+
+    def reset(self) -> None:
+        """Draw this run's biases."""
+        config, seed = self._config, self._seed
+        self._gyro, self._accel = stream(seed, "gyro"), stream(seed, "accelerometer")
+        self._magnetometer = stream(seed, "magnetometer")
+        self.gyro_bias: FloatArray = self._gyro.uniform(-1.0, 1.0, 3) * config.gyro_bias
+        self.accel_bias: FloatArray = self._accel.uniform(-1.0, 1.0, 3) * config.accel_bias
+        self.magnetometer_bias: FloatArray = (
+            self._magnetometer.uniform(-1.0, 1.0, 3) * config.magnetometer_bias
+        )
+        self._samples = 0
+
+    def measure(self, time: FloatArray, truth: FloatArray) -> ImuBatch:
+        """Samples of one frame.
+
+        Args:
+            time: (n,) s.
+            truth: (n, 9) angular velocity, specific force and magnetic field
+                at the sensor in the base frame.
+        """
+        config, count = self._config, len(time)
+        noise = self._gyro.standard_normal((count + 1, 3))
+        gyro = truth[:, 0:3] + (self.gyro_bias + config.gyro_noise * noise[:count])
+        span = count * config.imu_period
+        self.gyro_bias = self.gyro_bias + config.gyro_drift * math.sqrt(span / _MINUTE) * noise[count]
+        accel = config.accel_noise * self._accel.standard_normal((count, 3))
+        accel += truth[:, 3:6] + self.accel_bias
+        field = np.full((count, 3), np.nan)
+        for row in range(-self._samples % config.magnetometer_divider, count, config.magnetometer_divider):
+            noise_row = config.magnetometer_noise * self._magnetometer.standard_normal(3)
+            field[row] = truth[row, 6:9] + self.magnetometer_bias + noise_row
+        self._samples += count
+        return ImuBatch(
+            time=time, gyro=gyro, accel=accel, magnetometer=field, valid=np.ones(count, dtype=np.bool_)
+        )
+
+
+class FootSwitches:
+    """Four switches that close above a force, arrive late, and now and then chatter."""
+
+    def __init__(self, config: SensorConfig, seed: int) -> None:
+        self._config, self._seed = config, seed
+        self.reset()
+
+    def reset(self) -> None:
+        """All open, no history."""
+        self._rng = stream(self._seed, "switches")
+        self._closed = 0
+        self._chatter: tuple[float, int, int] | None = None
+        self._history: deque[tuple[float, int]] = deque([(-math.inf, 0)])
+
+    def measure(self, time: list[float], force: FloatArray, now: float) -> tuple[BoolArray, float]:
+        """Switch states as they arrive at `now`.
+
+        Args:
+            time: n sampling times since the last frame, s, rising.
+            force: (n, 4) N, force on each foot at those times.
+            now: s, time of the frame.
+
+        Returns:
+            (4,) states, and the time (s) at which they were sampled.
+        """
+        for when, state in zip(time, ((force > self._config.switch_threshold) @ _BITS).tolist(), strict=True):
+            self._sample(when, state)
+        limit = now - self._config.switch_delay + 1e-9
+        history = self._history
+        while len(history) > 1 and history[1][0] <= limit:
+            history.popleft()
+        when, state = history[0]
+        return (_BITS & state) != 0, when
+
+    def _sample(self, when: float, state: int) -> None:
+        if state != self._closed:
+            edges, before = state ^ self._closed, self._closed
+            self._closed = state
+            falling_back = edges & int((self._rng.random(N_LEGS) < self._config.switch_chatter) @ _BITS)
+            if falling_back:
+                # The edge itself is seen; the samples after it are the old state for a while.
+                self._chatter = (when + self._config.switch_chatter_time, falling_back, before)
+        elif self._chatter is not None:
+            until, feet, before = self._chatter
+            if when <= until:
+                state = (state & ~feet) | (before & feet)
+            else:
+                self._chatter = None
+        self._history.append((when, state))
+
+
+class ServoSensors:
+    """What servos report: quantised positions, noisy speeds, coarse loads."""
+
+    def __init__(self, config: SensorConfig, servo: ServoParameters, seed: int) -> None:
+        self._config, self._servo, self._seed = config, servo, seed
+        self.reset()
+
+    def reset(self) -> None:
+        """Restart the noise; the last position is unknown."""
+        self._rng = stream(self._seed, "servo reports")
+        self._last: FloatArray | None = None
+
+    def measure(
+        self, position: FloatArray, duty: FloatArray, period: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Reports of one frame.
+
+        Args:
+            position: (16,) rad, true joint angles now.
+            duty: (16,) mean duty since the last frame.
+            period: s since the last frame.
+
+        Returns:
+            (16,) positions in rad, (16,) speeds in rad/s, (16,) loads as
+            fractions of stall torque. A speed is the mean since the last frame,
+            so half a period old.
+        """
+        config, step = self._config, self._servo.step_angle
+        quantised = np.floor(position / step + 0.5) * step
+        last = position if self._last is None else self._last
+        noise = self._rng.standard_normal((2, N_JOINTS))
+        speed = (position - last) / period + config.speed_noise * noise[0]
+        self._last = position.copy()
+        load = duty + config.load_noise * noise[1]
+        return (
+            quantised,
+            np.rint(speed / SPEED_UNIT) * SPEED_UNIT,
+            np.rint(load / config.load_step) * config.load_step,
+        )
