@@ -1,0 +1,148 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.io.robot import Robot
+from bluefoot_mpc.io.safety import SafetyConfig, SafetySupervisor
+from bluefoot_mpc.types import ImuBatch, JointCommand, SafetyLevel, SensorFrame
+
+
+def make_frame(time=0.0, **changes):
+    imu = ImuBatch(
+        time=np.zeros(0), gyro=np.zeros((0, 3)), accel=np.zeros((0, 3)),
+        magnetometer=np.zeros((0, 3)), valid=np.zeros(0, dtype=bool),
+    )  # fmt: skip
+    frame = SensorFrame(
+        time=time, joint_position=np.zeros(16), joint_speed=np.zeros(16), joint_load=np.zeros(16),
+        joint_temperature=np.full(16, 30.0), joint_time=np.full(16, time), joint_valid=np.ones(16, dtype=bool),
+        voltage=12.0, voltage_valid=True, imu=imu, contact=np.ones(4, dtype=bool),
+        contact_time=np.full(4, time), contact_valid=np.ones(4, dtype=bool),
+    )  # fmt: skip
+    return replace(frame, **changes)
+
+
+class FakeRobot:
+    period = 0.02
+
+    def __init__(self):
+        self.sent = []
+        self.next = make_frame()
+        self.stops = 0
+
+    def reset(self):
+        return self.next
+
+    def step(self, command):
+        self.sent.append(command)
+        return self.next
+
+    def stop(self):
+        self.stops += 1
+
+    def close(self):
+        pass
+
+
+@pytest.fixture
+def fake():
+    return FakeRobot()
+
+
+@pytest.fixture
+def supervisor(fake):
+    made = SafetySupervisor(fake, np.full(16, -1.0), np.full(16, 1.0), SafetyConfig())
+    made.reset()
+    return made
+
+
+def goal(value, torque=1.0):
+    return JointCommand(position=np.full(16, value), speed=np.zeros(16), torque_limit=np.full(16, torque))
+
+
+def test_the_supervisor_is_a_robot_itself(supervisor):
+    assert isinstance(supervisor, Robot)
+
+
+def test_goals_are_clamped_to_limits_and_slew(supervisor, fake):
+    supervisor.step(goal(0.9))
+    np.testing.assert_allclose(fake.sent[-1].position, SafetyConfig().max_goal_rate * 0.02)
+    for _ in range(20):
+        supervisor.step(goal(5.0))
+    np.testing.assert_allclose(fake.sent[-1].position, 1.0)
+
+
+@pytest.mark.parametrize("field", ["position", "speed", "torque_limit"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_command_that_is_not_finite_is_discarded_and_stops_the_robot(supervisor, fake, field, value):
+    supervisor.step(goal(0.1))
+    good = fake.sent[-1]
+    bad = getattr(goal(0.2), field).copy()
+    bad[5] = value
+    supervisor.step(replace(goal(0.2), **{field: bad}))
+    np.testing.assert_array_equal(fake.sent[-1].position, good.position)
+    assert supervisor.request.level is SafetyLevel.STOP
+    assert "FR_hip_pitch" in supervisor.request.reasons[0]
+    supervisor.step(goal(0.1))
+    assert supervisor.request.level is SafetyLevel.STOP  # a NaN is never forgotten
+
+
+def test_the_first_command_may_be_nan(supervisor, fake):
+    supervisor.step(goal(np.nan))
+    np.testing.assert_array_equal(fake.sent[-1].position, 0.0)
+
+
+def test_reset_forgets_every_fault(supervisor):
+    supervisor.step(goal(np.nan))
+    supervisor.reset()
+    assert supervisor.request.level is SafetyLevel.NONE
+
+
+def test_stop_latches_the_torque_off(supervisor, fake):
+    supervisor.stop()
+    supervisor.step(goal(0.1))
+    assert fake.stops == 1
+    np.testing.assert_array_equal(fake.sent[-1].torque_limit, 0.0)
+
+
+@pytest.mark.parametrize(("degrees", "level"), [(60.0, 0), (66.0, SafetyLevel.SIT), (69.0, SafetyLevel.STOP)])
+def test_heat(supervisor, fake, degrees, level):
+    heat = np.full(16, 30.0)
+    heat[2] = degrees
+    fake.next = make_frame(joint_temperature=heat)
+    supervisor.step(goal(0.0))
+    assert supervisor.request.level == level
+    if level:
+        assert "FL_knee" in supervisor.request.reasons[0]
+
+
+def test_voltage_is_filtered_before_it_counts(supervisor, fake):
+    supervisor.step(goal(0.0))
+    fake.next = make_frame(voltage=9.0)
+    supervisor.step(goal(0.0))
+    assert supervisor.request.level is SafetyLevel.NONE
+    for _ in range(60):
+        supervisor.step(goal(0.0))
+    assert supervisor.request.level is SafetyLevel.SIT
+    for _ in range(200):
+        supervisor.step(goal(0.0))
+    assert supervisor.request.level is SafetyLevel.STOP
+
+
+def test_lost_joint_readings_make_it_sit_and_are_forgiven(supervisor, fake):
+    valid = np.ones(16, dtype=bool)
+    valid[:8] = False
+    fake.next = make_frame(joint_valid=valid)
+    for _ in range(25):
+        supervisor.step(goal(0.0))
+    assert supervisor.request.level is SafetyLevel.SIT
+    fake.next = make_frame()
+    for _ in range(100):
+        supervisor.step(goal(0.0))
+    assert supervisor.request.level is SafetyLevel.NONE
+
+
+def test_thresholds_must_be_in_order():
+    with pytest.raises(ConfigurationError, match="sit threshold"):
+        SafetyConfig(voltage_sit=9.0, voltage_stop=9.6)
