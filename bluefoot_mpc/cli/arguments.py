@@ -1,0 +1,215 @@
+"""Arguments of every command: one dataclass each, its docstrings are the help texts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from bluefoot_mpc.exceptions import ConfigurationError
+
+_Unset = tyro.conf.arg(help_behavior_hint="")  # None means: as the scenario has it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Common:
+    """What every command takes."""
+
+    json: bool = False
+    """Print one JSON object on standard output and nothing else."""
+    debug: bool = False
+    """Show the traceback of an unexpected error."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ListCommand(Common):
+    """List the scenarios with one line each."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulationArguments(Common):
+    """What every simulated run takes."""
+
+    model: Annotated[str | None, _Unset] = None
+    """Parameter file of the robot (TOML), or the name of one that ships."""
+    seed: int = 0
+    """Seed of everything random; the same seed gives the same run."""
+    out: Annotated[Path | None, _Unset] = None
+    """Folder for the results (runs/<time>-<scenario> unless given)."""
+    config: Annotated[Path | None, _Unset] = None
+    """TOML file with any part of the configuration, as in a run's config.toml."""
+    set: Annotated[
+        tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="SECTION.KEY=VALUE")
+    ] = ()
+    """One value of the configuration."""
+    randomize: Literal["none", "standard"] = "none"
+    """Draw mass, friction, servo gain, voltage and latency from the seed, or not."""
+    no_report: bool = False
+    """Do not write report.html."""
+    world: Annotated[str | None, _Unset] = None
+    """World by name or TOML file."""
+    friction: Annotated[float | None, _Unset] = None
+    """Friction coefficient of the floor."""
+    slope: Annotated[float | None, _Unset] = None
+    """Slope of the floor, degrees; positive climbs."""
+    payload: Annotated[str | None, tyro.conf.arg(metavar="KG,X,Y,Z", help_behavior_hint="")] = None
+    """Mass on the trunk and its place in the trunk's frame, kg and m."""
+    gait: Annotated[Literal["trot", "walk"] | None, _Unset] = None
+    """Gait."""
+
+    def run_fields(self) -> dict[str, Any]:
+        """Arguments by the names that RunOptions gives them."""
+        names = ("model", "seed", "out", "config", "randomize", "world", "friction", "slope", "gait")
+        fields = {name: getattr(self, name) for name in names}
+        payload = None if self.payload is None else parse_payload(self.payload)
+        return {**fields, "overrides": self.set, "report": not self.no_report, "payload": payload}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunCommand(SimulationArguments):
+    """Run a scenario and write its log, summary and report."""
+
+    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO", help_behavior_hint="")]
+    """Name of a scenario (see: bluefoot list), or path of a scenario script."""
+    robot: Literal["sim"] = "sim"
+    """What to run on."""
+    controller: Literal["cpg"] = "cpg"
+    """What decides."""
+    duration: Annotated[float | None, _Unset] = None
+    """Length of the run, s."""
+    view: bool = False
+    """Show the robot live in a browser."""
+    speed: Annotated[float | None, _Unset] = None
+    """Forward speed, m/s."""
+    lateral_speed: Annotated[float | None, _Unset] = None
+    """Speed to the left, m/s."""
+    yaw_rate: Annotated[float | None, _Unset] = None
+    """Turning to the left, rad/s."""
+    impulse: Annotated[float | None, _Unset] = None
+    """Push: impulse on the trunk, N·s."""
+    direction: Annotated[float | None, _Unset] = None
+    """Push: direction from forward, degrees, left positive."""
+    push_time: Annotated[float | None, _Unset] = None
+    """Push: time after the start, s."""
+
+    def run_fields(self) -> dict[str, Any]:
+        """Arguments by the names that RunOptions gives them."""
+        names = ["robot", "controller", "duration", "view", "speed", "lateral_speed"]
+        names += ["yaw_rate", "impulse", "direction", "push_time"]
+        return {**super().run_fields(), **{name: getattr(self, name) for name in names}}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplayCommand(Common):
+    """Show a recorded run, or run today's controller on its sensor frames."""
+
+    log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG", help_behavior_hint="")]
+    """The log.mcap of a run, or the run's folder."""
+    view: bool = False
+    """Play the run in a browser, at its own pace."""
+    html: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """Write the 3D replay as one HTML file that opens offline."""
+    rethink: bool = False
+    """Give the recorded frames to today's controller; exit status 1 where its commands differ."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelArguments(Common):
+    """What every command on the model takes."""
+
+    model: Annotated[str | None, _Unset] = None
+    """Parameter file of the robot (TOML), or the name of one that ships."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckCommand(ModelArguments):
+    """Compare Pinocchio and MuJoCo on the same robot at random states."""
+
+    states: int = 1000
+    """Number of random states."""
+    seed: int = 0
+    """Seed of the states."""
+
+    def __post_init__(self) -> None:
+        if self.states < 1:
+            raise ConfigurationError(f"--states = {self.states} must be at least 1")
+        if self.seed < 0:
+            raise ConfigurationError(f"--seed = {self.seed} must not be negative")
+
+
+@dataclass(frozen=True, kw_only=True)
+class UrdfCommand(ModelArguments):
+    """Write the robot's URDF, generated from its parameter file."""
+
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """File to write (standard output unless given)."""
+    check: bool = False
+    """Write nothing; exit status 1 where the file that ships beside the parameter file is out of date."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RomCommand(ModelArguments):
+    """Range of motion of legs and trunk: figures and pictures."""
+
+    out: Path = Path("runs/rom")
+    """Folder for the pictures."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PowerCommand(ModelArguments):
+    """Power budget and run-times on one charge."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveCommand(SimulationArguments):
+    """Drive the simulated robot from the keyboard, or a gamepad."""
+
+    no_view: bool = False
+    """Do not show the robot in a browser."""
+    timeout: float = 5.0
+    """Dead man: seconds without a key until the robot stops walking."""
+    gamepad: Path = Path("/dev/input/js0")
+    """Device of the gamepad; used where there is one."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.timeout <= 600.0:
+            raise ConfigurationError(f"--timeout = {self.timeout} must lie in 0..600 seconds, 0 excluded")
+
+    def run_fields(self) -> dict[str, Any]:
+        """Arguments by the names that RunOptions gives them."""
+        return {**super().run_fields(), "view": not self.no_view}
+
+
+ModelCommand = (
+    Annotated[CheckCommand, tyro.conf.subcommand("check")]
+    | Annotated[UrdfCommand, tyro.conf.subcommand("urdf")]
+    | Annotated[RomCommand, tyro.conf.subcommand("rom")]
+    | Annotated[PowerCommand, tyro.conf.subcommand("power")]
+)
+Command = (
+    Annotated[ListCommand, tyro.conf.subcommand("list")]
+    | Annotated[RunCommand, tyro.conf.subcommand("run")]
+    | Annotated[ReplayCommand, tyro.conf.subcommand("replay")]
+    | Annotated[
+        ModelCommand, tyro.conf.subcommand("model", description="Check and export the robot's model.")
+    ]
+    | Annotated[DriveCommand, tyro.conf.subcommand("drive")]
+)
+
+
+def parse_payload(text: str) -> tuple[float, float, float, float]:
+    """(kg, x, y, z) from ``KG,X,Y,Z``.
+
+    Raises:
+        ConfigurationError: the text has another form.
+    """
+    parts = text.split(",")
+    try:
+        mass, x, y, z = (float(part) for part in parts)
+    except ValueError:
+        raise ConfigurationError(
+            f"--payload = '{text}' is not of the form KG,X,Y,Z, for example 0.3,0.02,0,0.05"
+        ) from None
+    return mass, x, y, z

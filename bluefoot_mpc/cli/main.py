@@ -1,0 +1,114 @@
+"""Entry point of ``bluefoot``: parse, run the command, print its page or its JSON, return the exit status."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import os
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import cast
+
+from rich.console import Console
+from rich.text import Text
+
+from bluefoot_mpc.cli import arguments
+from bluefoot_mpc.cli.outcome import FAILED, INTERRUPTED, Outcome, to_json
+from bluefoot_mpc.cli.parse import parse
+from bluefoot_mpc.exceptions import BlueFootError
+
+_EXECUTE: dict[type, str] = {
+    arguments.ListCommand: "run:list_scenarios",
+    arguments.RunCommand: "run:run",
+    arguments.ReplayCommand: "replay:replay",
+    arguments.CheckCommand: "model:check",
+    arguments.UrdfCommand: "model:urdf",
+    arguments.RomCommand: "model:rom",
+    arguments.PowerCommand: "model:power",
+    arguments.DriveCommand: "drive:drive",
+}
+"""Command to the function that runs it; imported late, so that ``--help`` is quick."""
+
+
+def main(argv: Sequence[str] | None = None, prog: str = "bluefoot") -> int:
+    """Run one command line and return its exit status (0, 1, 2, 3 or 130; see the help)."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    as_json, debug = "--json" in words, "--debug" in words
+    try:
+        with _only_json() if as_json else contextlib.nullcontext():
+            outcome = _execute(words, prog)
+    except SystemExit as stop:  # --help
+        return int(stop.code or 0)
+    except BlueFootError as error:
+        return _fail(str(error), error.exit_status, as_json, notes(error))
+    except KeyboardInterrupt as stop:
+        return _fail("interrupted", INTERRUPTED, as_json, notes(stop))
+    except Exception as error:
+        # The one place that catches everything: a user gets a sentence, the file gets the traceback.
+        if debug:
+            raise
+        evidence = f"the traceback is in {_keep_traceback()} (--debug shows it)"
+        message = f"unexpected {type(error).__name__}: {error}"
+        return _fail(message, FAILED, as_json, (*notes(error), evidence))
+    return _show(outcome, as_json)
+
+
+def notes(error: BaseException) -> tuple[str, ...]:
+    """What was added to an exception on its way up, such as where the log lies."""
+    return tuple(getattr(error, "__notes__", ()))
+
+
+def _execute(words: Sequence[str], prog: str) -> Outcome:
+    command = parse(words, prog)
+    module, _, name = _EXECUTE[type(command)].partition(":")
+    function = getattr(importlib.import_module(f"bluefoot_mpc.cli.{module}"), name)
+    return cast(Callable[[arguments.Common], Outcome], function)(command)
+
+
+def _show(outcome: Outcome, as_json: bool) -> int:
+    try:
+        if as_json:
+            print(to_json(outcome.data), flush=True)
+        else:
+            console = Console(highlight=False)
+            for part in outcome.page:
+                console.print(part)
+            sys.stdout.flush()
+    except BrokenPipeError:
+        # The reader (head, less) has seen enough; keep the interpreter from flushing again at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    return outcome.status
+
+
+def _fail(message: str, status: int, as_json: bool, remarks: Sequence[str] = ()) -> int:
+    text = "\n".join((message, *remarks))
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    console.print(Text.assemble(("bluefoot: ", "bold red"), text))
+    if as_json:
+        print(to_json({"error": text, "exit_status": status}), flush=True)
+    return status
+
+
+def _keep_traceback() -> Path:
+    name = f"bluefoot-error-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.txt"
+    path = Path(tempfile.gettempdir()) / name
+    path.write_text(traceback.format_exc(), encoding="utf-8")
+    return path
+
+
+@contextlib.contextmanager
+def _only_json() -> Iterator[None]:
+    """Send what anybody else prints, libraries in C included, to standard error."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with contextlib.redirect_stdout(sys.stderr):
+            yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)

@@ -1,0 +1,60 @@
+"""``bluefoot model``: parity of the engines, URDF, range of motion, power budget."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+from rich.table import Table
+from rich.text import Text
+
+from bluefoot_mpc.cli.arguments import CheckCommand, UrdfCommand
+from bluefoot_mpc.cli.outcome import FAILED, OK, Outcome
+from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.model.parameters import load_parameters
+from bluefoot_mpc.model.resources import model_file
+from bluefoot_mpc.model.urdf import make_urdf
+from bluefoot_mpc.sim.parity import check_parity
+
+
+def check(command: CheckCommand) -> Outcome:
+    """Compare Pinocchio and MuJoCo."""
+    report = check_parity(load_parameters(command.model), n=command.states, seed=command.seed)
+    table = Table(title=f"Pinocchio against MuJoCo, {report.states} random states", title_justify="left")
+    table.add_column("quantity")
+    table.add_column("largest relative error", justify="right")
+    for name, error in report.errors.items():
+        table.add_row(
+            name.replace("_", " "), f"{error:.1e}", style="" if error <= report.tolerance else "red"
+        )
+    verdict = "agree" if report.agree else "DISAGREE"
+    line = f"{report.mass:.3f} kg; the engines {verdict} (tolerance {report.tolerance:.0e})"
+    data = {**dataclasses.asdict(report), "agree": report.agree, "worst": report.worst}
+    return Outcome(status=OK if report.agree else FAILED, data=data, page=(table, line))
+
+
+def urdf(command: UrdfCommand) -> Outcome:
+    """Export the URDF, or check the one that ships."""
+    text = make_urdf(load_parameters(command.model))
+    source = model_file(command.model or "bluefoot")
+    if command.check:
+        return _check_urdf(text, command.out or source.with_suffix(".urdf"), source)
+    if command.out is None:
+        return Outcome(data={"urdf": text}, page=(Text(text.rstrip("\n"), no_wrap=True, overflow="ignore"),))
+    _write(command.out, text)
+    return Outcome(data={"file": command.out, "source": source}, page=(f"wrote {command.out}",))
+
+
+def _check_urdf(text: str, file: Path, source: Path) -> Outcome:
+    fresh = file.is_file() and file.read_text(encoding="utf-8") == text
+    line = f"{file} is up to date" if fresh else f"{file} is out of date: bluefoot model urdf --out {file}"
+    data = {"file": file, "source": source, "up_to_date": fresh}
+    return Outcome(status=OK if fresh else FAILED, data=data, page=(Text(line),))
+
+
+def _write(file: Path, text: str) -> None:
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(f"cannot write {file}: {error.strerror or error}") from error

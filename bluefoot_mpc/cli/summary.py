@@ -1,0 +1,159 @@
+"""The page that a run ends with: key figures, verdict, where the results lie."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from bluefoot_mpc.scenarios import Criterion
+
+Summary = Mapping[str, Any]
+Row = tuple[str, str, str]
+_NONE = "–"
+_FILES = (
+    ("report", "report.html"),
+    ("log", "log.mcap"),
+    ("summary", "summary.json"),
+    ("configuration", "config.toml"),
+)
+
+
+def summary_page(summary: Summary, criteria: Sequence[Criterion], folder: Path) -> tuple[RenderableType, ...]:
+    """One page on a finished run.
+
+    Args:
+        summary: content of summary.json.
+        criteria: the scenario's conditions of success.
+        folder: where the run's files lie.
+    """
+    heading = Text.assemble((_title(summary), "bold"), "\n")
+    return (heading, _table(_rows(summary)), _verdict(summary, criteria), _files(folder))
+
+
+def _title(summary: Summary) -> str:
+    gait = summary.get("gait")
+    parts = [
+        str(summary.get("scenario", "run")),
+        f"{gait} gait" if gait else "",
+        f"{_number(summary.get('duration_s'), 1)} s",
+        f"seed {summary.get('seed', _NONE)}",
+        f"controller {summary.get('controller', _NONE)}",
+    ]
+    return ", ".join(part for part in parts if part)
+
+
+def _rows(summary: Summary) -> list[Row]:
+    get = summary.get
+    tick = get("tick_us") or {}
+    rows: list[Row] = [
+        ("speed", _scaled(get("speed_mps"), 1e3, 1, "mm/s"), _of_command(summary)),
+        ("distance", _scaled(get("distance_m"), 1.0, 2, "m"), _drift(summary)),
+        ("roll", _scaled(get("roll_rms_deg"), 1.0, 2, "° RMS"), _peak(get("roll_peak_deg"))),
+        ("pitch", _scaled(get("pitch_rms_deg"), 1.0, 2, "° RMS"), _peak(get("pitch_peak_deg"))),
+        ("attitude estimate", _scaled(get("attitude_error_rms_deg"), 1.0, 2, "° RMS"), "against the truth"),
+        ("swing clearance", _scaled(get("swing_clearance_median_m"), 1e3, 1, "mm"), "median of the swings"),
+        ("ZMP inside support", _scaled(get("zmp_inside_fraction"), 100.0, 1, "%"), _zmp_margin(summary)),
+        ("servo torque", _scaled(get("torque_rms_nm"), 1.0, 2, "N·m RMS"), _torque_peak(summary)),
+        ("servo temperature", _scaled(get("servo_temp_max_c"), 1.0, 1, "°C"), "the hottest"),
+        ("energy", _scaled(get("energy_j"), 1.0, 0, "J"), _transport(summary)),
+        ("tick", _scaled(tick.get("p50"), 1.0, 0, "µs median"), _tick_tail(summary)),
+        ("speed of the simulation", _scaled(get("real_time_factor"), 1.0, 1, "x real time"), ""),
+    ]
+    rows += [(name.replace("_", " "), _figure(value), "") for name, value in (get("figures") or {}).items()]
+    return [row for row in rows if row[1] != _NONE]
+
+
+def _table(rows: list[Row]) -> Table:
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 1))
+    table.add_column(style="cyan")
+    table.add_column(justify="right", no_wrap=True)
+    table.add_column(style="dim")
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    return table
+
+
+def _verdict(summary: Summary, criteria: Sequence[Criterion]) -> Text:
+    text = Text("\n")
+    for criterion in criteria:
+        mark, style = ("yes", "green") if criterion.holds else ("NO ", "bold red")
+        text.append(f" {mark}  ", style).append(f"{criterion.name}: {criterion.detail}\n")
+    if all(criterion.holds for criterion in criteria):
+        return text.append("OK", "bold green").append(": every criterion of the scenario holds\n")
+    reason = summary.get("stop_reason")
+    ended = "" if reason in (None, "completed") else f"; the run ended early: {reason}"
+    return text.append("FAILED", "bold red").append(f": a criterion of the scenario does not hold{ended}\n")
+
+
+def _files(folder: Path) -> Text:
+    lines = [f"{name:<14} {folder / file}" for name, file in _FILES if (folder / file).is_file()]
+    return Text("\n".join(lines or [f"results        {folder}"]), no_wrap=True, overflow="ignore")
+
+
+def _number(value: Any, digits: int) -> str:
+    if not isinstance(value, (int, float)) or isinstance(value, bool) or not math.isfinite(value):
+        return _NONE
+    return f"{value:.{digits}f}"
+
+
+def _scaled(value: Any, factor: float, digits: int, unit: str) -> str:
+    text = _NONE if value is None else _number(value * factor, digits)
+    return text if text == _NONE else f"{text} {unit}"
+
+
+def _of_command(summary: Summary) -> str:
+    reference = summary.get("speed_ref_mps")
+    return f"of {reference * 1e3:.0f} mm/s commanded" if reference else ""
+
+
+def _drift(summary: Summary) -> str:
+    drift = _scaled(summary.get("lateral_drift_m"), 1e3, 0, "mm")
+    turn = _scaled(summary.get("yaw_drift_deg"), 1.0, 1, "°")
+    return _joined(("sideways", drift), ("turned", turn))
+
+
+def _zmp_margin(summary: Summary) -> str:
+    return _joined(("least margin", _scaled(summary.get("zmp_margin_min_m"), 1e3, 1, "mm")))
+
+
+def _torque_peak(summary: Summary) -> str:
+    return _peak(summary.get("torque_peak_nm"), "N·m")
+
+
+def _transport(summary: Summary) -> str:
+    return _joined(("cost of transport", _number(summary.get("cost_of_transport"), 1)))
+
+
+def _tick_tail(summary: Summary) -> str:
+    tick = summary.get("tick_us") or {}
+    pairs = [(name, _number(tick.get(name), 0)) for name in ("p99", "max")]
+    missed = summary.get("deadline_misses")
+    return _joined(*pairs, ("deadlines missed", _NONE if missed is None else str(missed)))
+
+
+def _peak(value: Any, unit: str = "°") -> str:
+    return _joined(("peak", _scaled(value, 1.0, 2, unit)))
+
+
+def _joined(*pairs: tuple[str, str]) -> str:
+    return ", ".join(f"{name} {text}" for name, text in pairs if text != _NONE)
+
+
+def _figure(value: Any) -> str:
+    writers: dict[type, Callable[[Any], str]] = {
+        bool: lambda v: "yes" if v else "no",
+        float: lambda v: f"{v:.4g}",
+    }
+    if value is None:
+        return _NONE
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {_figure(entry)}" for key, entry in value.items())
+    if isinstance(value, (list, tuple)):
+        return ", ".join(_figure(entry) for entry in value)
+    return writers.get(type(value), str)(value)
