@@ -1,0 +1,1 @@
+"""Gait: pattern generator, couplings, reflex, virtual robot, footholds, schedule."""

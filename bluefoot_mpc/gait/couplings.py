@@ -1,0 +1,88 @@
+"""Named gaits: how the four oscillators couple, and how one gait becomes another.
+
+House leg order FL, FR, RL, RR. The matrices are those of the paper's chapter 5
+after the corrections that make them produce the footfall orders it shows: the
+first locks diagonal pairs, the transpose of the second's lower rows gives the
+lateral sequence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from bluefoot_mpc.exceptions import UnknownNameError
+
+Matrix = tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Coupling:
+    """One gait's place in the network.
+
+    Attributes:
+        name: name of the gait.
+        matrix: 16 entries of K, row-major, unit strength.
+        lag: (4,) lags of lift-off behind `leader`, fractions of the cycle.
+        leader: leg that lifts first when the gait starts.
+        least_stance: fewest feet that this gait leaves on the ground.
+    """
+
+    name: str
+    matrix: Matrix
+    lag: tuple[float, float, float, float]
+    leader: int
+    least_stance: int
+
+
+TROT = Coupling(
+    name="trot",
+    matrix=(0.0, -1.0, -0.5, 1.0, -1.0, 0.0, 1.0, -0.5, -0.5, 1.0, 0.0, -1.0, 1.0, -0.5, -1.0, 0.0),
+    lag=(0.0, 0.5, 0.5, 0.0),
+    leader=0,
+    least_stance=2,
+)
+WALK = Coupling(
+    name="walk",
+    matrix=(0.0, -1.0, 0.5, -1.0, -1.0, 0.0, -1.0, 0.5, -0.5, 1.0, 0.0, -1.0, 1.0, -0.5, -1.0, 0.0),
+    lag=(0.5, 0.0, 0.25, 0.75),
+    leader=1,
+    least_stance=3,
+)
+COUPLINGS: Mapping[str, Coupling] = MappingProxyType({c.name: c for c in (TROT, WALK)})
+
+
+def coupling(name: str) -> Coupling:
+    """The coupling of a named gait.
+
+    Raises:
+        UnknownNameError: there is no such gait; the message lists the valid ones.
+    """
+    try:
+        return COUPLINGS[name]
+    except (KeyError, TypeError):
+        raise UnknownNameError("gait", str(name), COUPLINGS) from None
+
+
+def scaled(matrix: Sequence[float], gain: float) -> Matrix:
+    """`gain` times a coupling matrix."""
+    return tuple(gain * entry for entry in matrix)
+
+
+def shift_weights(weights: Sequence[float], target: int, amount: float) -> tuple[float, ...]:
+    """Move a convex mixture of gaits towards one of them.
+
+    Args:
+        weights: non-negative shares of the gaits, adding to one.
+        target: index of the gait to move to.
+        amount: how much of the whole to move, >= 0.
+
+    Returns:
+        New shares; exactly one-hot once the target is reached.
+    """
+    share = weights[target] + amount
+    if share >= 1.0 - 1e-9:
+        return tuple(float(i == target) for i in range(len(weights)))
+    shrink = (1.0 - share) / (1.0 - weights[target])
+    return tuple(share if i == target else shrink * w for i, w in enumerate(weights))

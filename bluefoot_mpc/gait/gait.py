@@ -1,0 +1,219 @@
+"""The gait: from a velocity command to swing states and feet in the robot-relative frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.gait.calibration import LimitCycle
+from bluefoot_mpc.gait.config import GaitConfig
+from bluefoot_mpc.gait.couplings import coupling
+from bluefoot_mpc.gait.engine import NAMES, GaitEngine
+from bluefoot_mpc.gait.footholds import Stride, early_contact, freeze, virtual_foothold
+from bluefoot_mpc.gait.reflex import IDLE, ReflexOutput, reflex
+from bluefoot_mpc.gait.state import GaitInputs, GaitOutput, GaitState
+from bluefoot_mpc.types import BoolArray, ContactSchedule, FloatArray, GaitPhase
+
+__all__ = ["Gait", "GaitConfig", "GaitInputs", "GaitOutput"]
+
+
+class Gait:
+    """Pattern generator, virtual robot and feet of one walking robot.
+
+    Args:
+        config: everything that shapes the gait.
+        stance_feet: (4, 3) m, nominal feet in b'; their height is not used
+            (feet stand on the ground plane of b').
+
+    Raises:
+        ConfigurationError: the feet are not four finite points, or the network
+            cannot give a wanted swing share.
+    """
+
+    def __init__(self, config: GaitConfig, stance_feet: FloatArray) -> None:
+        feet = np.asarray(stance_feet, dtype=float)
+        if feet.shape != (4, 3) or not np.all(np.isfinite(feet)):
+            raise ConfigurationError(f"stance feet must be 4 finite points, not {feet.tolist()!r}")
+        self.config = config
+        self._nominal = tuple(complex(x, y) for x, y, _ in feet.tolist())
+        self._engine = GaitEngine(config)
+        self.reset()
+
+    def reset(self) -> None:
+        """Stand at the origin with every foot at its nominal place."""
+        self.state = self._engine.rest(self._nominal)
+
+    def limit_cycle(self, gait: str) -> LimitCycle:
+        """The measured limit cycle of a named gait.
+
+        Raises:
+            UnknownNameError: there is no such gait.
+        """
+        return self._engine.cycles[NAMES.index(coupling(gait).name)]
+
+    def step(self, inputs: GaitInputs, dt: float) -> GaitOutput:
+        """Advance by one tick.
+
+        Commands that are not finite are ignored and the last good ones kept.
+
+        Args:
+            inputs: command and estimates.
+            dt: s.
+
+        Raises:
+            UnknownNameError: there is no such gait.
+        """
+        state = self.state
+        self._accept(state, inputs)
+        contact: list[bool] = np.asarray(inputs.contact, dtype=bool).tolist()
+        estimates = _estimates(inputs.foot_position)
+        state.reflex = self._reflex(state, inputs, contact, estimates)
+        stride = self._engine.advance(state, dt)
+        if state.walking and stride is not None:
+            self._check_contacts(state, contact, estimates, stride)
+        return self._output(state)
+
+    def schedule(self, horizon: float, dt: float) -> ContactSchedule:
+        """Roll the gait forward under the present command; the live state stays untouched.
+
+        Args:
+            horizon: s.
+            dt: s between samples; the first lies one `dt` ahead.
+
+        Returns:
+            Contacts, and footholds in the b' of now: where each foot stands, or
+            will stand next.
+        """
+        state = self.state.copy()
+        state.reflex = IDLE
+        count = max(1, round(horizon / dt))
+        stance = np.empty((count, 4), dtype=np.bool_)
+        places = np.empty((count, 4, 3))
+        last = None
+        for k in range(count):
+            last = self._engine.advance(state, dt)
+            for leg, foot in enumerate(state.feet):
+                stance[k, leg] = not foot.swinging
+                point = self.state.pose.to_local(foot.anchor)
+                places[k, leg] = (point.real, point.imag, foot.z)
+        self._fill_swings(state, stance, places, last)
+        return ContactSchedule(time=np.arange(1, count + 1) * np.float64(dt), stance=stance, footholds=places)
+
+    def set_footholds(self, footholds: FloatArray, given: Sequence[bool] | BoolArray) -> None:
+        """Replace the places where feet land next.
+
+        A foot in the air on a minimum-jerk path takes its new foothold from the
+        next lift-off on; on the paper's law it turns to it at once. Each is
+        used once.
+
+        Args:
+            footholds: (4, 3) m in the b' of now.
+            given: (4,) True where the row holds a foothold.
+        """
+        places = np.asarray(footholds, dtype=float)
+        for foot, place, valid in zip(self.state.feet, places.tolist(), given, strict=True):
+            if valid and all(map(math.isfinite, place)):
+                goal = self.state.pose.to_world(complex(place[0], place[1]))
+                if foot.swinging and self.config.foothold.law == "minimum_jerk":
+                    foot.later = (goal, place[2])
+                else:
+                    foot.goal, foot.goal_z = goal, place[2]
+
+    def _accept(self, state: GaitState, inputs: GaitInputs) -> None:
+        state.target = NAMES.index(coupling(inputs.gait).name)
+        forward, left = float(inputs.velocity[0]), float(inputs.velocity[1])
+        if math.isfinite(forward) and math.isfinite(left):
+            velocity = complex(forward, left)
+            state.wanted = velocity if abs(velocity) > self.config.still_speed else 0j
+        if math.isfinite(inputs.yaw_rate):
+            rate = float(inputs.yaw_rate)
+            state.wanted_yaw_rate = rate if abs(rate) > self.config.still_speed else 0.0
+
+    def _reflex(
+        self,
+        state: GaitState,
+        inputs: GaitInputs,
+        contact: list[bool],
+        estimates: list[tuple[complex, float]] | None,
+    ) -> ReflexOutput:
+        if not self.config.reflex.enabled:
+            return IDLE
+        error: list[float] = np.asarray(inputs.tilt_rate_error, dtype=float).tolist()
+        if not all(map(math.isfinite, error)):
+            return IDLE
+        if estimates is None:
+            places = [foot.in_b(state.pose) for foot in state.feet]
+        else:
+            places = [place for place, _ in estimates]
+        return reflex(error, places, contact, self.config.reflex)
+
+    def _check_contacts(
+        self,
+        state: GaitState,
+        contact: list[bool],
+        estimates: list[tuple[complex, float]] | None,
+        stride: Stride,
+    ) -> None:
+        for leg, foot in enumerate(state.feet):
+            if foot.swinging:
+                progress = state.rhythm.progress(state.cpg.y1[leg], state.cpg.y2[leg])[1]
+                if early_contact(foot, contact[leg], progress, self.config.foothold):
+                    freeze(foot, estimates[leg] if estimates else None, stride, self.config.foothold)
+
+    def _fill_swings(
+        self, state: GaitState, stance: BoolArray, places: FloatArray, last: Stride | None
+    ) -> None:
+        """Give samples in swing the place where the foot lands next (changes `places`)."""
+        for leg, foot in enumerate(state.feet):
+            landing = places[-1, leg].copy()
+            if foot.swinging and last is not None:
+                progress = state.rhythm.progress(state.cpg.y1[leg], state.cpg.y2[leg])[1]
+                later = state.pose.moved(state.velocity, state.yaw_rate, (1.0 - progress) * last.swing_time)
+                goal = foot.goal or later.to_world(virtual_foothold(foot, last, self.config.foothold))
+                point = self.state.pose.to_local(goal)
+                landing[:] = (point.real, point.imag, foot.goal_z if foot.goal else foot.offset_z)
+            for k in range(len(stance) - 1, -1, -1):
+                if stance[k, leg]:
+                    landing = places[k, leg]
+                else:
+                    places[k, leg] = landing
+
+    def _output(self, state: GaitState) -> GaitOutput:
+        rhythm, cpg = state.rhythm, state.cpg
+        phase, progress, rows = [], [], []
+        for leg, foot in enumerate(state.feet):
+            swing, part = rhythm.progress(cpg.y1[leg], cpg.y2[leg])
+            phase.append(rhythm.share * part if swing else rhythm.share + (1.0 - rhythm.share) * part)
+            progress.append(part if swing else 0.0)
+            place = foot.in_b(state.pose)
+            rows.append((place.real, place.imag, foot.z))
+        feet = np.array(rows)
+        return GaitOutput(
+            phase=GaitPhase(
+                swing=np.array([foot.swinging for foot in state.feet]),
+                y1=np.array(cpg.y1),
+                y2=np.array(cpg.y2),
+                phase=np.array(phase) % 1.0,
+                walking=state.walking,
+            ),
+            foot_position=feet,
+            foot_height=feet[:, 2].copy(),
+            swing_progress=np.array(progress),
+            virtual_pose=np.array([state.pose.centre.real, state.pose.centre.imag, state.pose.yaw]),
+            velocity=np.array([state.velocity.real, state.velocity.imag]),
+            yaw_rate=state.yaw_rate,
+            cycle_time=state.cycle,
+        )
+
+
+def _estimates(feet: FloatArray | None) -> list[tuple[complex, float]] | None:
+    """Feet as (x + iy, z), or None when any is unknown."""
+    if feet is None:
+        return None
+    rows: list[list[float]] = np.asarray(feet, dtype=float).tolist()
+    if not all(math.isfinite(value) for row in rows for value in row):
+        return None
+    return [(complex(x, y), z) for x, y, z in rows]
