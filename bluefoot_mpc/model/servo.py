@@ -76,9 +76,9 @@ def motor_torque(
     return servo.stall_torque * voltage / servo.nominal_voltage * duty_cycle - servo.back_emf * speed
 
 
-def winding_current(servo: ServoParameters, torque: FloatArray) -> FloatArray:
-    """Current in the winding (A) that makes a motor torque (N·m)."""
-    return torque * (servo.stall_current / servo.stall_torque)
+def current_per_torque(servo: ServoParameters) -> float:
+    """Current in the winding per motor torque at the shaft, A/(N·m)."""
+    return servo.stall_current / servo.stall_torque
 
 
 def winding_resistance(servo: ServoParameters) -> float:

@@ -152,6 +152,7 @@ class SimConfig:
     backlash_deg: float | None = None  # degrees in all; None takes the parameter file's
     load_friction_speed: float = 0.5  # rad/s above which load-dependent friction fades
     settle_time: float = 0.5  # s of standing before the run starts
+    visuals: bool = False  # keep the shapes that are only to look at, for pictures from MuJoCo
     sensors: SensorConfig = field(default_factory=SensorConfig)
     world: WorldConfig = field(default_factory=WorldConfig)
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)

@@ -8,6 +8,7 @@ from collections import deque
 import mujoco
 import numpy as np
 
+from bluefoot_mpc.exceptions import DeviceError
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.sim.config import SimConfig
 from bluefoot_mpc.sim.randomization import draw
@@ -115,6 +116,9 @@ class SimRobot:
         """Send a command, let one command period pass, return the next frame.
 
         A command that is not finite is discarded, as the bus driver does.
+
+        Raises:
+            DeviceError: the physics became unstable.
         """
         if (
             np.isfinite(command.position).all()
@@ -174,6 +178,8 @@ class SimRobot:
         self._truth.start_frame()
         times = self._advance()
         dt, now = self.config.physics_period, self._step * self.config.physics_period
+        if not math.isfinite(self._world.data.qpos[self._world.q + 2]):
+            raise DeviceError(f"the simulation became unstable before t = {now:.3f} s")
         count = len(times)
         samples = self._samples[:count].copy()
         duty, power, voltage = self._bank.finish_frame(self._steps)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -112,7 +113,8 @@ class ServoBank:
         servo = self.config.servo
         self.goal[:] = law.to_counts(servo, command.position)
         self.speed_limit[:] = law.quantise_speed_limit(command.speed) / servo.step_angle
-        self._wanted_limit[:] = np.floor(np.clip(command.torque_limit, 0.0, 1.0) * law.FULL_DUTY) / law.FULL_DUTY
+        limit = np.clip(command.torque_limit, 0.0, 1.0)
+        self._wanted_limit[:] = np.floor(limit * law.FULL_DUTY) / law.FULL_DUTY
         # A shut-down servo works again only when it has cooled and its limit is written anew.
         self.shut_down &= self.temperature >= law.SHUTDOWN_TEMPERATURE
         self._apply_limits()
@@ -144,16 +146,17 @@ class ServoBank:
         brake = np.where(self.torque_limit > 0.0, servo.back_emf, 0.0)
         self.plant.damping[:] = brake + servo.viscous_friction
 
-    def _connect(self) -> tuple[object, Callable[[], None]]:
+    def _connect(self) -> tuple[Any, Callable[[], None]]:
         """Bind the function to memory. States are updated in place: see `servo_function`."""
+        buffer: Any
         buffer, run = self._function.buffer()
         plant = self.plant
         states = (self.profile, self.play, self.voltage, self.sums)
         inputs = (plant.position, plant.speed, self.goal, self.speed_limit, self.torque_limit, *states)
         for index, array in enumerate(inputs):
-            buffer.set_arg(index, memoryview(array))
+            buffer.set_arg(index, array.data)
         for index, array in enumerate((plant.drive, plant.friction, self.duty, self.torque, *states)):
-            buffer.set_res(index, memoryview(array))
+            buffer.set_res(index, array.data)
         return buffer, run
 
 
@@ -188,7 +191,7 @@ def servo_function(config: BankConfig) -> ca.Function:
     friction = servo.coulomb_friction + servo.load_friction * fading * ca.fabs(torque)
     friction = ca.DM(config.friction_scale) * friction
 
-    current = law.winding_current(servo, torque)
+    current = law.current_per_torque(servo) * torque
     supply = ca.sum1(ca.fmax(duty * current, 0.0)) + n * config.standby_current
     next_voltage = config.open_voltage - config.battery.resistance * supply
     next_sums = sums + ca.vertcat(current**2, duty, voltage * supply, voltage)
