@@ -58,7 +58,7 @@ class Dynamics:
         return self.bias(q, v) - self.gravity(q)
 
     def coriolis_matrix(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """(22, 22) C(q, v), such that dM/dt - 2 C is skew for the joints and M-rate = C + Cᵀ."""
+        """(22, 22) C(q, v) of Christoffel symbols: its product with v is `coriolis`."""
         return np.array(pin.computeCoriolisMatrix(self._model, self._data, q, v))
 
     def foot_positions(self, q: FloatArray) -> FloatArray:
