@@ -102,7 +102,7 @@ def calibrate(coupling: Coupling, gain: float, share: float, config: CpgConfig) 
             high, high_error = alpha, error
     found = "stalls" if cycle is None else f"reaches {cycle.rhythm.share:.3f}"
     raise ConfigurationError(
-        f"swing_share = {share!r} is out of reach of {coupling.name} with coupling_gain = {gain!r}: it {found}"
+        f"swing_share = {share!r} is out of reach: {coupling.name} with coupling_gain = {gain!r} {found}"
     )
 
 
@@ -124,7 +124,7 @@ def measure(coupling: Coupling, gain: float, alpha: float, config: CpgConfig) ->
     first = rises[-2]
     blend = begin - first
     start = (1.0 - blend) * states[first] + blend * states[first + 1]
-    start[4 + coupling.leader] = 0.0
+    start[4:][np.abs(start[4:]) < 1e-3] = 0.0  # the leader, and whoever lifts with it
     a, b, c, d, e, f, g, h = start.tolist()
     rhythm = Rhythm(
         matrix=matrix,

@@ -124,6 +124,11 @@ class Gait:
 
     def _accept(self, state: GaitState, inputs: GaitInputs) -> None:
         state.target = NAMES.index(coupling(inputs.gait).name)
+        if inputs.halt:
+            state.wanted = state.velocity = 0j
+            state.wanted_yaw_rate = state.yaw_rate = 0.0
+            state.landing = state.walking
+            return
         forward, left = float(inputs.velocity[0]), float(inputs.velocity[1])
         if math.isfinite(forward) and math.isfinite(left):
             velocity = complex(forward, left)
@@ -170,16 +175,23 @@ class Gait:
         for leg, foot in enumerate(state.feet):
             landing = places[-1, leg].copy()
             if foot.swinging and last is not None:
-                progress = state.rhythm.progress(state.cpg.y1[leg], state.cpg.y2[leg])[1]
-                later = state.pose.moved(state.velocity, state.yaw_rate, (1.0 - progress) * last.swing_time)
-                goal = foot.goal or later.to_world(virtual_foothold(foot, last, self.config.foothold))
-                point = self.state.pose.to_local(goal)
-                landing[:] = (point.real, point.imag, foot.goal_z if foot.goal else foot.offset_z)
+                point, height = self._landing(state, leg, last)
+                landing[:] = (point.real, point.imag, height)
             for k in range(len(stance) - 1, -1, -1):
                 if stance[k, leg]:
                     landing = places[k, leg]
                 else:
                     places[k, leg] = landing
+
+    def _landing(self, state: GaitState, leg: int, stride: Stride) -> tuple[complex, float]:
+        """Where a foot in swing will land: place in the live b' and height, m."""
+        foot = state.feet[leg]
+        if foot.goal is not None:
+            return self.state.pose.to_local(foot.goal), foot.goal_z
+        progress = state.rhythm.progress(state.cpg.y1[leg], state.cpg.y2[leg])[1]
+        later = state.pose.moved(state.velocity, state.yaw_rate, (1.0 - progress) * stride.swing_time)
+        goal = later.to_world(virtual_foothold(foot, stride, self.config.foothold))
+        return self.state.pose.to_local(goal), foot.offset_z
 
     def _output(self, state: GaitState) -> GaitOutput:
         rhythm, cpg = state.rhythm, state.cpg

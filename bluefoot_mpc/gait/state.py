@@ -27,6 +27,7 @@ class GaitInputs:
         foot_position: (4, 3) m, estimated feet in b', or None when unknown.
         tilt_rate_error: (2,) rad/s, estimated minus wanted angular velocity
             about x and y of the heading frame.
+        halt: True ends the gait at once: feet in the air land, then all rest.
     """
 
     velocity: FloatArray = field(default_factory=lambda: np.zeros(2))
@@ -35,6 +36,7 @@ class GaitInputs:
     contact: BoolArray = field(default_factory=lambda: np.ones(4, dtype=np.bool_))
     foot_position: FloatArray | None = None
     tilt_rate_error: FloatArray = field(default_factory=lambda: np.zeros(2))
+    halt: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
