@@ -1,0 +1,265 @@
+"""Contact-aided invariant Kalman filter of attitude, velocity and feet.
+
+After Bloesch et al. (contact-aided state of a legged robot: IMU for the
+prediction, kinematics of the standing feet for the correction), with the
+right-invariant error of Barrau and Bonnabel as Hartley et al. use it for
+contacts. Two changes: the feet are kept relative to the IMU, so that the
+unobservable position leaves the state, and a standing foot rolls on its ball.
+
+Errors live in the world frame: with ``^`` for estimates and E = exp(xi),
+``R^ = E R``, ``v^ = E v + rho_v``, ``s_i^ = E s_i + rho_i``, and biases as
+differences. The foot measurement then reads ``R^ y_i - s_i^ = -rho_i + noise``,
+whatever the attitude, and a foot set down anew is uncorrelated with the rest.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from bluefoot_mpc.estimation.config import EstimatorConfig, ImuConfig
+from bluefoot_mpc.estimation.inertial import (
+    Motion,
+    Quaternion,
+    Vector,
+    quaternion_product,
+    rotation_matrix,
+    small_quaternion,
+)
+from bluefoot_mpc.model.parameters import GRAVITY
+from bluefoot_mpc.types import N_LEGS, FloatArray
+
+IndexArray = np.ndarray[tuple[int], np.dtype[np.intp]]
+
+ATTITUDE = np.arange(0, 3)
+VELOCITY = np.arange(3, 6)
+FEET = np.arange(6, 18)
+GYRO_BIAS = np.arange(18, 21)
+ACCEL_BIAS = np.arange(21, 24)
+HARD_IRON = np.arange(24, 26)
+SIZE = 26
+
+_NO_ERROR = np.eye(SIZE)
+# Linear map from a vector to the nine entries of its skew matrix.
+_SKEW = np.zeros((3, 9))
+_SKEW[0, 5], _SKEW[0, 7] = -1.0, 1.0
+_SKEW[1, 2], _SKEW[1, 6] = 1.0, -1.0
+_SKEW[2, 1], _SKEW[2, 3] = -1.0, 1.0
+# Gravity's moment of an attitude error, (0, 0, -g) x xi, on velocity.
+_TOPPLE = np.array(((0.0, GRAVITY, 0.0), (-GRAVITY, 0.0, 0.0), (0.0, 0.0, 0.0)))
+
+
+class FilterState(NamedTuple):
+    """Estimate and covariance.
+
+    Attributes:
+        quaternion: rotation_base_to_world, x, y, z, w.
+        velocity: m/s of the IMU, world.
+        feet: (4, 3) m, foot points relative to the IMU, world axes.
+        gyro_bias: rad/s, base frame.
+        accel_bias: m/s², base frame.
+        hard_iron: of the field, constant part of the magnetometer in the base's x and y.
+        covariance: (26, 26) of the errors: attitude, velocity, four feet, gyro
+            bias, accelerometer bias, hard iron.
+    """
+
+    quaternion: Quaternion
+    velocity: Vector
+    feet: FloatArray
+    gyro_bias: Vector
+    accel_bias: Vector
+    hard_iron: tuple[float, float]
+    covariance: FloatArray
+
+
+class Noise(NamedTuple):
+    """Variances that one frame adds.
+
+    Attributes:
+        rate: rad²/s², of the frame's mean angular velocity.
+        force: m²/s⁴, of its mean specific force.
+    """
+
+    rate: float
+    force: float
+
+
+def frame_noise(samples: int, config: ImuConfig) -> Noise:
+    """Variance of the mean of so many samples, or of not knowing without any."""
+    if samples == 0:
+        return Noise(config.lost_rate**2, config.lost_accel**2)
+    return Noise(config.gyro_noise**2 / samples, config.accel_noise**2 / samples)
+
+
+def initial_state(quaternion: Quaternion, tilt: float, config: EstimatorConfig) -> FilterState:
+    """State at the first frame: at rest, yaw zero by definition, feet not yet known.
+
+    Args:
+        quaternion: rotation_base_to_world with zero yaw.
+        tilt: rad, deviation of its roll and pitch.
+        config: deviations of the rest.
+    """
+    deviation = np.empty(SIZE)
+    deviation[ATTITUDE] = (tilt, tilt, 1e-3)
+    deviation[VELOCITY] = config.initial_speed
+    deviation[FEET] = 1.0
+    deviation[GYRO_BIAS] = config.imu.gyro_bias
+    deviation[ACCEL_BIAS] = config.imu.accel_bias
+    deviation[HARD_IRON] = config.heading.hard_iron
+    zero = (0.0, 0.0, 0.0)
+    return FilterState(quaternion, zero, np.zeros((N_LEGS, 3)), zero, zero, (0.0, 0.0), np.diag(deviation**2))
+
+
+def transition(
+    rotation: FloatArray, velocity: FloatArray, feet: FloatArray, dt: float
+) -> tuple[FloatArray, FloatArray]:
+    """Linear propagation of the error over one frame.
+
+    Args:
+        rotation: (3, 3) rotation_base_to_world in the middle of the frame.
+        velocity: (3,) m/s, world.
+        feet: (4, 3) m, relative to the IMU, world axes.
+        dt: s.
+
+    Returns:
+        (26, 26) transition of the error, and (18, 3) lever of an angular rate
+        error in world axes on attitude, velocity and feet.
+    """
+    levers = np.empty((6, 3, 3))
+    levers[0] = _NO_ERROR[:3, :3]
+    levers[1:] = (np.concatenate((velocity[None], feet)) @ _SKEW).reshape(5, 3, 3)
+    lever = levers.reshape(18, 3)
+    step = _NO_ERROR.copy()
+    topple = dt * _TOPPLE
+    half = -0.5 * dt * topple
+    step[3:6, 0:3] = topple
+    step[:18, 18:21] = (-dt) * lever @ rotation
+    step[3:6, 18:21] += half @ rotation
+    step[3:6, 21:24] = (-dt) * rotation
+    fall = (0.5 * dt * dt) * rotation
+    for row in (6, 9, 12, 15):
+        step[row : row + 3, 0:3] = half
+        step[row : row + 3, 21:24] = fall
+    step[_FEET_DIAGONAL, _VELOCITY_DIAGONAL] = -dt
+    return step, lever
+
+
+_FEET_DIAGONAL = FEET
+_VELOCITY_DIAGONAL = np.tile(VELOCITY, N_LEGS)
+
+
+def predict(
+    state: FilterState, motion: Motion, roll: FloatArray, noise: Noise, dt: float, config: EstimatorConfig
+) -> FilterState:
+    """Carry estimate and covariance over one frame.
+
+    Args:
+        state: at the start.
+        motion: mean motion of the IMU, from `inertial.integrate`.
+        roll: (4, 3) m, way of the foot points over the ground by rolling, world axes.
+        noise: of the frame's inertial samples.
+        dt: s.
+        config: drifts and slip.
+    """
+    velocity = np.array(state.velocity)
+    feet = state.feet + roll - np.array(motion.displacement)
+    rotation = rotation_matrix(motion.quaternion)
+    step, lever = transition(rotation, velocity, state.feet, dt)
+    covariance = step @ state.covariance @ step.T
+    covariance[:18, :18] += (noise.rate * dt * dt) * (lever @ lever.T)
+    covariance.reshape(-1)[:: SIZE + 1] += _diagonal_noise(noise, dt, config)
+    return state._replace(
+        quaternion=motion.quaternion, velocity=motion.velocity, feet=feet, covariance=covariance
+    )
+
+
+def _diagonal_noise(noise: Noise, dt: float, config: EstimatorConfig) -> FloatArray:
+    diagonal = np.zeros(SIZE)
+    diagonal[3:6] = noise.force * dt * dt
+    diagonal[6:18] = config.contact.slip**2 * dt
+    diagonal[18:21] = config.imu.gyro_drift**2 * dt
+    diagonal[21:24] = config.imu.accel_drift**2 * dt
+    return diagonal
+
+
+def correct(state: FilterState, index: IndexArray, residual: FloatArray, noise: FloatArray) -> FilterState:
+    """Use direct measurements of some components of the error.
+
+    Args:
+        state: before.
+        index: (m,) components measured.
+        residual: (m,) measured minus estimated.
+        noise: (m, m) covariance of the measurement.
+    """
+    covariance = state.covariance
+    rows = covariance[index]
+    gain = np.linalg.solve(rows[:, index] + noise, rows)
+    reduced = covariance - rows.T @ gain
+    return shifted(state, residual @ gain, 0.5 * (reduced + reduced.T))
+
+
+def correct_scalar(state: FilterState, row: FloatArray, residual: float, variance: float) -> FilterState:
+    """Use one measurement of the combination ``row @ error`` (26,), with `residual` = estimated minus measured."""
+    spread = state.covariance @ row
+    scale = 1.0 / (float(row @ spread) + variance)
+    reduced = state.covariance - np.outer(scale * spread, spread)
+    return shifted(state, (-residual * scale) * spread, reduced)
+
+
+def shifted(state: FilterState, change: FloatArray, covariance: FloatArray) -> FilterState:
+    """The state moved by a (26,) correction, with a new covariance."""
+    c: list[float] = change.tolist()
+    turn = small_quaternion(c[0], c[1], c[2])
+    matrix = rotation_matrix(turn)
+    moved = np.concatenate((np.array((state.velocity,)), state.feet)) @ matrix.T + change[3:18].reshape(5, 3)
+    velocity = moved[0].tolist()
+    (gx, gy, gz), (ax, ay, az), (hx, hy) = state.gyro_bias, state.accel_bias, state.hard_iron
+    return FilterState(
+        quaternion_product(turn, state.quaternion),
+        (velocity[0], velocity[1], velocity[2]),
+        moved[1:],
+        (gx + c[18], gy + c[19], gz + c[20]),
+        (ax + c[21], ay + c[22], az + c[23]),
+        (hx + c[24], hy + c[25]),
+        covariance,
+    )
+
+
+def plant_feet(state: FilterState, legs: list[int], feet: FloatArray, noise: FloatArray) -> FilterState:
+    """Forget some feet and take them up anew where the kinematics see them.
+
+    Args:
+        state: before.
+        legs: indices of the feet.
+        feet: (4, 3) m, measured, relative to the IMU, world axes.
+        noise: (4, 3, 3) m², its covariances.
+    """
+    if not legs:
+        return state
+    covariance = state.covariance.copy()
+    points = state.feet.copy()
+    for leg in legs:
+        rows = slice(6 + 3 * leg, 9 + 3 * leg)
+        covariance[rows, :] = 0.0
+        covariance[:, rows] = 0.0
+        covariance[rows, rows] = noise[leg]
+        points[leg] = feet[leg]
+    return state._replace(feet=points, covariance=covariance)
+
+
+def distances(state: FilterState, residual: FloatArray, noise: FloatArray) -> list[float]:
+    """Squared Mahalanobis distance of each foot's residual.
+
+    Args:
+        state: before the correction.
+        residual: (4, 3) m.
+        noise: (4, 3, 3) m².
+    """
+    blocks = state.covariance[_BLOCK_ROWS, _BLOCK_COLUMNS] + noise
+    solved = np.linalg.solve(blocks, residual[:, :, None])[:, :, 0]
+    return list((solved * residual).sum(axis=1).tolist())
+
+
+_BLOCK_ROWS = FEET.reshape(N_LEGS, 3, 1)
+_BLOCK_COLUMNS = FEET.reshape(N_LEGS, 1, 3)

@@ -1,0 +1,98 @@
+"""Yaw relative to the starting heading from the magnetometer.
+
+The reference is the mean field, turned into the world, of the first samples. It
+contains the hard iron as it lay at the start, so a measured heading is wrong by
+the difference of the hard iron between now and then: two states of the filter.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from bluefoot_mpc.estimation.config import HeadingConfig
+from bluefoot_mpc.estimation.filter import SIZE, FilterState, correct_scalar
+from bluefoot_mpc.estimation.inertial import rotated
+from bluefoot_mpc.types import FloatArray
+
+YAW = 2
+HARD_IRON_X, HARD_IRON_Y = 24, 25
+
+
+class HeadingReference(NamedTuple):
+    """Field at the start.
+
+    Attributes:
+        x: of the field, sum, then mean, of its horizontal part in the world.
+        y: the same.
+        samples: how many were taken.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    samples: int = 0
+
+
+def newest_field(samples: FloatArray, valid: list[bool]) -> tuple[float, float, float] | None:
+    """The last complete, valid row of (n, 3) magnetometer samples."""
+    rows: list[list[float]] = samples.tolist()
+    for row, good in zip(reversed(rows), reversed(valid), strict=True):
+        if good and math.isfinite(row[0] + row[1] + row[2]):
+            return (row[0], row[1], row[2])
+    return None
+
+
+def advance_heading(
+    state: FilterState, reference: HeadingReference, field: tuple[float, float, float], config: HeadingConfig
+) -> tuple[FilterState, HeadingReference]:
+    """Take one magnetometer sample, for the reference first, then for the yaw.
+
+    Args:
+        state: filter.
+        reference: field at the start, as far as it is known.
+        field: over its nominal strength, base frame.
+        config: noise and gates.
+    """
+    x, y, _ = rotated(state.quaternion, *field)
+    if reference.samples < config.reference_samples:
+        n = reference.samples
+        return state, HeadingReference(
+            (n * reference.x + x) / (n + 1), (n * reference.y + y) / (n + 1), n + 1
+        )
+    strength = math.hypot(reference.x, reference.y)
+    change = abs(math.hypot(x, y) - strength)
+    if strength < config.min_horizontal or change > config.gate * strength + 2.0 * config.hard_iron:
+        return state, reference
+    ux, uy = reference.x / strength, reference.y / strength
+    residual = math.atan2(ux * y - uy * x, ux * x + uy * y)
+    row, iron = heading_row(state, (ux, uy), strength)
+    variance = (config.noise / strength) ** 2
+    return correct_scalar(state, row, residual - iron, variance), reference
+
+
+def heading_row(
+    state: FilterState, direction: tuple[float, float], strength: float
+) -> tuple[FloatArray, float]:
+    """How the heading's residual depends on the error, and the hard iron's share of it.
+
+    Args:
+        state: filter.
+        direction: unit vector of the reference field in the world's horizontal plane.
+        strength: of the reference field.
+
+    Returns:
+        (26,) derivative of (residual - share) by the error, and the share, rad.
+    """
+    qx, qy, qz, qw = state.quaternion
+    yaw = math.atan2(2.0 * (qx * qy + qz * qw), 1.0 - 2.0 * (qy * qy + qz * qz))
+    c, s = math.cos(yaw) - 1.0, math.sin(yaw)
+    ux, uy = direction
+    # Sideways part of (Rz(yaw) - 1) h, along t = (-uy, ux), over the strength.
+    wx, wy = (-uy * c + ux * s) / strength, (uy * s + ux * c) / strength
+    hx, hy = state.hard_iron
+    row = np.zeros(SIZE)
+    row[YAW] = 1.0
+    row[HARD_IRON_X], row[HARD_IRON_Y] = -wx, -wy
+    return row, wx * hx + wy * hy
