@@ -218,6 +218,7 @@ class Gait:
             velocity=np.array([state.velocity.real, state.velocity.imag]),
             yaw_rate=state.yaw_rate,
             cycle_time=state.cycle,
+            swing_share=rhythm.share,
         )
 
 

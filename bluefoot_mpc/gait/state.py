@@ -54,6 +54,7 @@ class GaitOutput:
         velocity: (2,) m/s in b', the command after its ramp.
         yaw_rate: rad/s, after its ramp.
         cycle_time: s.
+        swing_share: share of the cycle that a leg swings.
     """
 
     phase: GaitPhase
@@ -64,6 +65,7 @@ class GaitOutput:
     velocity: FloatArray
     yaw_rate: float
     cycle_time: float
+    swing_share: float
 
 
 @dataclass(kw_only=True, slots=True)
