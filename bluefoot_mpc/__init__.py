@@ -11,13 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from bluefoot_mpc.model.robot import load_robot as load_robot
+    from bluefoot_mpc.scenarios import RunOptions as RunOptions
     from bluefoot_mpc.scenarios import Scenario as Scenario
+    from bluefoot_mpc.scenarios import ScenarioConfig as ScenarioConfig
     from bluefoot_mpc.scenarios import run as run
 
-__all__ = ["Scenario", "load_robot", "run"]
+__all__ = ["RunOptions", "Scenario", "ScenarioConfig", "load_robot", "run"]
 
 _HOMES = {
+    "RunOptions": "bluefoot_mpc.scenarios",
     "Scenario": "bluefoot_mpc.scenarios",
+    "ScenarioConfig": "bluefoot_mpc.scenarios",
     "load_robot": "bluefoot_mpc.model.robot",
     "run": "bluefoot_mpc.scenarios",
 }

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from bluefoot_mpc.control.modes import ModeConfig
 from bluefoot_mpc.control.posture import PostureConfig
 from bluefoot_mpc.control.tracking import TrackingConfig
-from bluefoot_mpc.estimation.estimator import EstimatorConfig
-from bluefoot_mpc.gait.gait import GaitConfig
-from bluefoot_mpc.model.ankle import AnkleConfig
+from bluefoot_mpc.estimation.config import EstimatorConfig
+from bluefoot_mpc.gait.config import GaitConfig
+from bluefoot_mpc.model.legs.ankle import AnkleConfig
 from bluefoot_mpc.zmp.placement import PlacementConfig
 
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from bluefoot_mpc.geometry import rotation_from_rpy
-from bluefoot_mpc.model.ankle import AnkleConfig, ankle_directions
 from bluefoot_mpc.model.legs import LegGeometry, inverse
+from bluefoot_mpc.model.legs.ankle import AnkleConfig, ankle_directions
 from bluefoot_mpc.types import FloatArray, PostureReference
 
 START_TIME = 1.0
@@ -45,7 +45,7 @@ class JointTargets:
         """
         rotation = rotation_from_rpy(reference.trunk_rpy)
         feet = (reference.foot_position - reference.trunk_position) @ rotation
-        gamma = ankle_directions(self._geometry, feet, rotation, self._ankle)
+        gamma = ankle_directions(self._geometry, self._ankle, feet, rotation[2])
         result = inverse(self._geometry, feet, gamma)
         goal = np.clip(result.joints, self._geometry.lower, self._geometry.upper)
         events = tuple(violation.describe() for violation in result.violations)

@@ -9,7 +9,7 @@ from bluefoot_mpc.control.posture import PostureConfig
 from bluefoot_mpc.gait.gait import GaitOutput
 from bluefoot_mpc.model.legs import LegGeometry, joint_positions_in_base
 from bluefoot_mpc.model.parameters import RobotParameters
-from bluefoot_mpc.types import BodyState, FloatArray, MotionCommand, PostureReference
+from bluefoot_mpc.types import BodyState, BoolArray, FloatArray, MotionCommand, PostureReference
 from bluefoot_mpc.zmp import placement
 from bluefoot_mpc.zmp.mass_points import lump
 from bluefoot_mpc.zmp.placement import PlacementConfig
@@ -79,8 +79,14 @@ class TrunkPlanner:
         # the trunk's axes, relative to the trunk's neutral place.
         points = joint_positions_in_base(self._geometry, estimate.joint_position)
         com = placement.centre_of_mass(self._masses, self._masses.trunk_com, points)
-        swing = gait.phase.swing if gait.phase.walking else np.zeros(4, dtype=bool)
-        zmp = placement.static_zmp(self._masses, com, points, swing) + self._placement
+        zmp = placement.static_zmp(self._masses, com, points, self._swing_ahead(gait)) + self._placement
         force = placement.boundary_force(self.position, gait.foot_position, law)
         self._placement = placement.advance(self._placement, zmp, force, self._masses, dt, law)
         return zmp
+
+    def _swing_ahead(self, gait: GaitOutput) -> BoolArray:
+        """(4,) True where a leg will swing after the law's lead time, at the present rhythm."""
+        if not gait.phase.walking:
+            return np.zeros(4, dtype=np.bool_)
+        ahead = (gait.phase.phase + self._zmp.lead / gait.cycle_time) % 1.0
+        return np.asarray(ahead < gait.swing_share)

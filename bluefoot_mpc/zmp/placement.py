@@ -23,6 +23,7 @@ class PlacementConfig:
 
     enabled: bool = True
     gain: float = 3.0  # 1/s, K_Z
+    lead: float = 0.3  # s, how far ahead legs in swing are looked for: makes up for the law's own lag
     boundary_gain: float = 0.002  # K_F, (m/s)·kg per unit of boundary force
     boundary_sharpness: float = 120.0  # 1/m, k_l
     reach_min: float = 0.17  # m, trunk origin to foot
@@ -31,7 +32,7 @@ class PlacementConfig:
     max_rate: float = 0.25  # m/s
 
     def __post_init__(self) -> None:
-        require_nonnegative(gain=self.gain, boundary_gain=self.boundary_gain, max_offset=self.max_offset)
+        require_nonnegative(gain=self.gain, lead=self.lead, boundary_gain=self.boundary_gain, max_offset=self.max_offset)
         require_positive(boundary_sharpness=self.boundary_sharpness, max_rate=self.max_rate)
         if not 0.0 <= self.reach_min < self.reach_max:
             raise ConfigurationError(
