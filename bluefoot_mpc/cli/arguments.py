@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tyro
 
@@ -44,7 +44,7 @@ class SimulationArguments(Common):
         tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="SECTION.KEY=VALUE")
     ] = ()
     """One value of the configuration."""
-    randomize: Literal["none", "standard"] = "none"
+    randomize: Annotated[str, tyro.conf.arg(metavar="{none,standard}")] = "none"
     """Draw mass, friction, servo gain, voltage and latency from the seed, or not."""
     no_report: bool = False
     """Do not write report.html."""
@@ -56,7 +56,7 @@ class SimulationArguments(Common):
     """Slope of the floor, degrees; positive climbs."""
     payload: Annotated[str | None, tyro.conf.arg(metavar="KG,X,Y,Z", help_behavior_hint="")] = None
     """Mass on the trunk and its place in the trunk's frame, kg and m."""
-    gait: Annotated[Literal["trot", "walk"] | None, _Unset] = None
+    gait: Annotated[str | None, tyro.conf.arg(metavar="{trot,walk}", help_behavior_hint="")] = None
     """Gait."""
 
     def run_fields(self) -> dict[str, Any]:
@@ -73,9 +73,9 @@ class RunCommand(SimulationArguments):
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO", help_behavior_hint="")]
     """Name of a scenario (see: bluefoot list), or path of a scenario script."""
-    robot: Literal["sim"] = "sim"
+    robot: Annotated[str, tyro.conf.arg(metavar="{sim}")] = "sim"
     """What to run on."""
-    controller: Literal["cpg"] = "cpg"
+    controller: Annotated[str, tyro.conf.arg(metavar="{cpg}")] = "cpg"
     """What decides."""
     duration: Annotated[float | None, _Unset] = None
     """Length of the run, s."""

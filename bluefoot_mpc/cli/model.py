@@ -8,10 +8,11 @@ from pathlib import Path
 from rich.table import Table
 from rich.text import Text
 
-from bluefoot_mpc.cli.arguments import CheckCommand, UrdfCommand
+from bluefoot_mpc.cli.arguments import CheckCommand, PowerCommand, UrdfCommand
 from bluefoot_mpc.cli.outcome import FAILED, OK, Outcome
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.model.parameters import load_parameters
+from bluefoot_mpc.model.power import power_budget
 from bluefoot_mpc.model.resources import model_file
 from bluefoot_mpc.model.urdf import make_urdf
 from bluefoot_mpc.sim.parity import check_parity
@@ -43,6 +44,30 @@ def urdf(command: UrdfCommand) -> Outcome:
         return Outcome(data={"urdf": text}, page=(Text(text.rstrip("\n"), no_wrap=True, overflow="ignore"),))
     _write(command.out, text)
     return Outcome(data={"file": command.out, "source": source}, page=(f"wrote {command.out}",))
+
+
+def power(command: PowerCommand) -> Outcome:
+    """Show the power budget."""
+    parameters = load_parameters(command.model)
+    budget = power_budget(parameters.power)
+    table = Table(title=f"Power of {parameters.name}", title_justify="left")
+    for heading in ("consumer", "net", "V", "A", "W"):
+        table.add_column(heading, justify="left" if heading == "consumer" else "right")
+    for row in budget.rows:
+        table.add_row(row.name, str(row.net), f"{row.voltage:g}", f"{row.current:g}", f"{row.power:.3f}")
+    table.add_section()
+    table.add_row("losses (regulation, radio)", "", "", "", f"{budget.losses:.3f}")
+    table.add_row("nominal", "", "", "", f"{budget.nominal:.3f}")
+    table.add_row("worst case", "", "", "", f"{budget.worst:.3f}")
+    lines = [
+        f"{budget.capacity:g} Wh, all packs pooled: {budget.nominal_run_time:.1f} min nominal, "
+        f"{budget.worst_run_time:.1f} min in the worst case",
+        *(
+            f"net {net.net}, own packs: {net.power:.1f} W from {net.capacity:g} Wh, {net.run_time:.1f} min"
+            for net in budget.nets
+        ),
+    ]
+    return Outcome(data=dataclasses.asdict(budget), page=(table, "\n".join(lines)))
 
 
 def _check_urdf(text: str, file: Path, source: Path) -> Outcome:

@@ -33,6 +33,7 @@ _BOX = "│╭╮╰╯─"
 _WRONG_TYPE = re.compile(
     r"Error parsing (\S+): no type matching (\S+) could be instantiated from \[(.*?)\]\."
 )
+_WRONG_INT = re.compile(r"Error parsing (\S+): invalid literal for int\(\) with base 10: (.+)")
 _KINDS = {"FLOAT": "a number", "INT": "a whole number"}
 
 
@@ -67,7 +68,7 @@ def parse(argv: Sequence[str], prog: str = "bluefoot") -> arguments.Common:
         if stop.code in (0, None):
             raise
         raise UsageError(_sentence(complaint.getvalue())) from None
-    command, unknown = cast(tuple[arguments.Common, list[str]], parsed)
+    command, unknown = parsed
     if unknown:
         _reject(command, unknown)
     return command
@@ -110,4 +111,6 @@ def _sentence(complaint: str) -> str:
     if match := _WRONG_TYPE.match(text):
         option, kind, value = match.groups()
         return f"{option} = {value} is not {_KINDS.get(kind, f'of the form {kind}')}"
+    if match := _WRONG_INT.match(text):
+        return f"{match[1]} = {match[2]} is not a whole number"
     return f"{text} (see: --help)"
