@@ -33,6 +33,9 @@ class Dynamics:
         self._data = robot.pin_model.createData()
         self._feet = robot.foot_frame_ids
         self._zero = np.zeros(self._model.nv)
+        rows, columns = np.tril_indices(self._model.nv, -1)
+        self._below = rows * self._model.nv + columns
+        self._above = columns * self._model.nv + rows
         self._rotor = np.zeros(self._model.nv)
         if rotor_inertia:
             self._rotor[-N_JOINTS:] = robot.parameters.servo.armature
@@ -40,10 +43,12 @@ class Dynamics:
 
     def mass_matrix(self, q: FloatArray) -> FloatArray:
         """(22, 22) M(q), symmetric and positive definite; kg, kg·m, kg·m²."""
-        upper = np.triu(pin.crba(self._model, self._data, q))
-        full: FloatArray = upper + np.triu(upper, 1).T
-        full[np.diag_indices_from(full)] += self._rotor
-        return full
+        matrix: FloatArray = np.array(pin.crba(self._model, self._data, q), order="C")
+        entries = matrix.reshape(-1)
+        # Older versions of Pinocchio fill the upper triangle only.
+        entries[self._below] = entries[self._above]
+        entries[:: self._model.nv + 1] += self._rotor
+        return matrix
 
     def bias(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """(22,) C(q, v) v + G(q): force that holds the velocity constant; N, N·m, base frame."""
