@@ -8,14 +8,16 @@ from pathlib import Path
 from rich.table import Table
 from rich.text import Text
 
-from bluefoot_mpc.cli.arguments import CheckCommand, PowerCommand, UrdfCommand
+from bluefoot_mpc.cli.arguments import CheckCommand, PowerCommand, RomCommand, UrdfCommand
 from bluefoot_mpc.cli.outcome import FAILED, OK, Outcome
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.model.parameters import load_parameters
 from bluefoot_mpc.model.power import power_budget
 from bluefoot_mpc.model.resources import model_file
+from bluefoot_mpc.model.rom import study_range_of_motion
 from bluefoot_mpc.model.urdf import make_urdf
 from bluefoot_mpc.sim.parity import check_parity
+from bluefoot_mpc.viz.rom import save_rom_pictures
 
 
 def check(command: CheckCommand) -> Outcome:
@@ -44,6 +46,22 @@ def urdf(command: UrdfCommand) -> Outcome:
         return Outcome(data={"urdf": text}, page=(Text(text.rstrip("\n"), no_wrap=True, overflow="ignore"),))
     _write(command.out, text)
     return Outcome(data={"file": command.out, "source": source}, page=(f"wrote {command.out}",))
+
+
+def rom(command: RomCommand) -> Outcome:
+    """Study the range of motion and draw it."""
+    study = study_range_of_motion(load_parameters(command.model))
+    files = save_rom_pictures(study, command.out)
+    figures = study.figures()
+    table = Table(title=f"Range of motion of {study.robot}, feet planted", title_justify="left")
+    table.add_column("trunk")
+    table.add_column(f"ankle direction fixed at {figures['ankle_direction_deg']:.0f}°", justify="right")
+    table.add_column("ankle direction free", justify="right")
+    for label, key, unit in (("along x or y", "shift", "cm"), ("roll or pitch", "tilt", "deg")):
+        cells = (f"±{figures[f'{key}_{ankle}_{unit}']:.1f} {unit}" for ankle in ("fixed", "free"))
+        table.add_row(label, *cells)
+    page = (table, Text("\n".join(f"wrote {file}" for file in files)))
+    return Outcome(data={**figures, "files": files}, page=page)
 
 
 def power(command: PowerCommand) -> Outcome:
