@@ -125,7 +125,7 @@ def _make_plan(cls: type) -> _Plan:
         optional=_getters(cls, lambda hint: unwrap_optional(hint)[1]),
         bytes_holders=_getters(cls, _holds_bytes),
         tuples=_getters(cls, lambda hint: typing.get_origin(hint) is tuple),
-        arrays=_getters(cls, lambda hint: getattr(array_type(hint), "kind", "") == "f"),
+        arrays=_getters(cls, lambda hint: array_type(hint) is not None),
         floats=_getters(cls, lambda hint: hint is float),
     )
 

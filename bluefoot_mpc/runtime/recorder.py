@@ -11,6 +11,7 @@ is there.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import queue
 import threading
 from collections.abc import Mapping
@@ -80,8 +81,12 @@ class Recorder:
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._file: IO[bytes] = self.path.open("wb")
+        except OSError as error:
+            raise self._failure(error) from error
+        try:
             self._writer = _start_writer(self._file, period)
         except OSError as error:
+            _abandon(self._file)
             raise self._failure(error) from error
         self._channels = _register(self._writer)
         # A daemon thread with an exit handler completes the file even where nobody closes it.
@@ -141,15 +146,15 @@ class Recorder:
         self._queue.put(None)
         self._thread.join()
         try:
-            with self._file:
-                if self._error is None:
-                    if self._outcome:
-                        self._writer.flush()
-                        self._writer.add_metadata(OUTCOME, self._outcome)
-                    self._writer.finish()
+            if self._error is None:
+                if self._outcome:
+                    self._writer.add_metadata(OUTCOME, self._outcome)
+                self._writer.finish()
+                self._file.close()
         except OSError as error:
-            self._error = self._error or error
+            self._error = error
         if self._error is not None:
+            _abandon(self._file)
             raise self._failure(self._error)
 
     def __enter__(self) -> Recorder:
@@ -185,6 +190,12 @@ class Recorder:
 
     def _failure(self, error: OSError) -> LogError:
         return LogError(f"cannot write the log {self.path}: {error.strerror or error}")
+
+
+def _abandon(file: IO[bytes]) -> None:
+    """Close a file that cannot be written; what its buffer holds is lost."""
+    with contextlib.suppress(OSError):
+        file.close()
 
 
 def _start_writer(file: IO[bytes], period: float | None) -> Any:

@@ -62,8 +62,8 @@ class RethinkReport:
             return f"all {self.ticks} commands are equal, bit for bit"
         f = self.first
         return (
-            f"{self.differing} of {self.ticks} commands differ, by up to {self.max_difference:.3g} rad; first at "
-            f"{f.time:.3f} s: {f.joint} {f.quantity} was {f.recorded:.9g}, is {f.rethought:.9g}"
+            f"{self.differing} of {self.ticks} commands differ, by up to {self.max_difference:.3g} rad; "
+            f"first at {f.time:.3f} s: {f.joint} {f.quantity} was {f.recorded:.9g}, is {f.rethought:.9g}"
         )
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import orjson
@@ -23,6 +23,9 @@ from bluefoot_mpc.runtime import metrics
 from bluefoot_mpc.runtime.data import COMPLETED, RunData
 from bluefoot_mpc.runtime.window import Window, cut_window, measurement_window
 from bluefoot_mpc.types import Mode
+
+if TYPE_CHECKING:
+    from bluefoot_mpc.model.robot import RobotModel
 
 FALL_TILT = math.radians(45.0)
 """Tilt that counts as a fall, rad."""
@@ -42,26 +45,25 @@ SUMMARY_KEYS: tuple[str, ...] = (
 
 def summarize(
     run: RunData,
+    model: RobotModel | None = None,
     *,
     success: bool | None = None,
     window: tuple[float, float] | None = None,
     figures: Mapping[str, Any] | None = None,
-    foot_radius: float | None = None,
 ) -> dict[str, Any]:
     """Summary of a run, plain values only.
 
     Args:
         run: the run, live or from a log.
+        model: the robot that ran; None takes the one that the run's configuration describes.
         success: whether the scenario's criteria hold; None means that the run
             was completed without a fall.
         window: s, start and end of the measurement window in the time of the
             frames; None takes `measurement_window`.
         figures: the scenario's own figures, added to ``figures``.
-        foot_radius: m, radius of the rubber feet; None takes BlueFoot's.
     """
     start, end = window if window is not None else measurement_window(run)
     cut = cut_window(run, start, end)
-    radius = load_parameters().legs.foot_radius if foot_radius is None else foot_radius
     has_fallen = fell(run)
     summary: dict[str, Any] = {
         **_identity(run),
@@ -78,7 +80,7 @@ def summarize(
         "figures": {"window_s": [start, end]},
     }
     if cut is not None:
-        summary |= _motion(cut) | _attitude(cut) | _balance(cut, radius) | _effort(cut)
+        summary |= _motion(cut) | _attitude(cut) | _balance(cut, _foot_radius(run, model)) | _effort(cut)
         summary["figures"] |= _gait_figures(cut)
     summary["figures"] |= dict(figures or {})
     return {key: _plain(summary.get(key)) for key in SUMMARY_KEYS}
@@ -120,6 +122,13 @@ def _identity(run: RunData) -> dict[str, Any]:
     named = run.config.get("run", {})
     gait = run.commands[-1].motion.gait if any(c.motion.mode is Mode.WALK for c in run.commands) else None
     return {key: named.get(key) for key in ("scenario", "seed", "robot", "controller")} | {"gait": gait}
+
+
+def _foot_radius(run: RunData, model: RobotModel | None) -> float:
+    if model is not None:
+        return model.parameters.legs.foot_radius
+    legs = run.config.get("model", {}).get("legs", {})
+    return float(legs["foot_radius"]) if "foot_radius" in legs else load_parameters().legs.foot_radius
 
 
 def _hottest(run: RunData) -> float | None:
