@@ -249,6 +249,12 @@ class Part:
                 f"size of '{self.name}': a {self.shape} takes {count} sizes, not {len(self.size)}"
             )
         require_positive(**{f"size[{i}] of '{self.name}'": length for i, length in enumerate(self.size)})
+        # Grams or millimetres by mistake would make a robot that no engine can simulate.
+        require_range(1e-5, 100.0, **{f"mass (kg) of '{self.name}'": self.mass})
+        require_range(1e-4, 10.0, **{f"size[{i}] (m) of '{self.name}'": x for i, x in enumerate(self.size)})
+        require_range(
+            -10.0, 10.0, **{f"position[{i}] (m) of '{self.name}'": x for i, x in enumerate(self.position)}
+        )
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

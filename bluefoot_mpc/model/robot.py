@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.model.legs import LegGeometry, inverse
+from bluefoot_mpc.model.legs import IkResult, LegGeometry, inverse
 from bluefoot_mpc.model.parameters import GRAVITY, RobotParameters, load_parameters
 from bluefoot_mpc.model.resources import model_file
 from bluefoot_mpc.model.urdf import make_urdf
@@ -85,8 +85,16 @@ def _stance_joints(parameters: RobotParameters, geometry: LegGeometry) -> FloatA
         raise ConfigurationError(
             f"[stance] foot_x = {stance.foot_x:g}, foot_y = {stance.foot_y:g}, "
             f"trunk_height = {stance.trunk_height:g}, ankle_direction_deg = {stance.ankle_direction_deg:g} "
-            f"is no stance of this robot: {'; '.join(result.describe())}"
+            f"is no stance of this robot: {_shortened(result)}"
         )
     joints = result.joints.copy()
     joints.flags.writeable = False
     return joints
+
+
+def _shortened(result: IkResult, most: int = 4) -> str:
+    """What is wrong, reach before limits: a leg out of reach breaks limits for that reason alone."""
+    lost = int(np.count_nonzero(~result.reachable))
+    reasons = result.describe()[: lost or None]
+    rest = len(reasons) - most
+    return "; ".join(reasons[:most]) + (f"; and {rest} more" if rest > 0 else "")
