@@ -22,11 +22,11 @@ from bluefoot_mpc.types import FloatArray
 AnklePolicy = Literal["fixed", "ground", "margin"]
 
 # One scan over all reachable directions, fine enough to find the right hill, then
-# zooms of two old steps each: two leave 0.02° (a servo step is 0.29°).
+# zooms of two old steps each: two leave 0.03° (a servo step is 0.29°).
 SCAN_POINTS = 33
 ZOOMS = 2
 _REACH_ROUNDING = 1e-9  # of the knee's cosine
-_OFFSETS = np.linspace(-1.0, 1.0, SCAN_POINTS)
+_OFFSETS = 0.5 * np.pi * np.linspace(-1.0, 1.0, SCAN_POINTS)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -116,8 +116,9 @@ def widest_directions(
 
     A scan over the reachable directions, then zooms around the best of them.
     For feet below the hips the result is a continuous function of the foot
-    point (its slope jumps where another joint becomes the closest one). A foot
-    out of reach is pointed at.
+    point (its slope jumps where another joint becomes the closest one). On the
+    knee-down branch, where hills stand at both stretched ends, the scan may
+    settle on one that is some degrees lower. A foot out of reach is pointed at.
 
     Args:
         geometry: lengths and limits.
@@ -131,13 +132,19 @@ def widest_directions(
     """
     bearing, distance = _bearing_of_feet(geometry, feet_in_leg)
     ranges = (bearing, *_ranges(geometry, legs))
-    centre, width = np.zeros(()), _reachable_width(geometry, distance)
-    for _ in range(zooms + 1):
-        candidates = np.asarray(centre)[..., None] + width[..., None] * _OFFSETS
-        best = _score(geometry.links, distance, candidates, ranges, knee_up).argmax(axis=-1)
-        centre = np.take_along_axis(candidates, best[..., None], axis=-1)[..., 0]
-        width = width * (2.0 / (SCAN_POINTS - 1))
-    return np.asarray(np.pi - (np.pi - bearing - centre) % (2.0 * np.pi))
+    # Turns are width * sin(place): at the ends the knee is stretched and its angle grows
+    # with the square root of the turn, which this spacing makes smooth again.
+    width = _reachable_width(geometry, distance)
+    places = np.broadcast_to(_OFFSETS, (*distance.shape, SCAN_POINTS))
+    narrowing = 1.0
+    for zoom in range(zooms + 1):
+        turns = width[..., None] * np.sin(places)
+        best = _score(geometry.links, distance, turns, ranges, knee_up).argmax(axis=-1)[..., None]
+        if zoom < zooms:
+            narrowing *= 2.0 / (SCAN_POINTS - 1)
+            places = np.take_along_axis(places, best, axis=-1) + narrowing * _OFFSETS
+    turn = np.take_along_axis(turns, best, axis=-1)[..., 0]
+    return np.asarray(np.pi - (np.pi - bearing - turn) % (2.0 * np.pi))
 
 
 def widest_margin(
