@@ -1,0 +1,350 @@
+"""The report's figures of motion and balance, as plain plotly dictionaries.
+
+Colours that begin with ``@`` name a colour of the page, which changes with its
+light or dark theme. Every time axis is in seconds from the first tick.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from bluefoot_mpc.geometry import convex_hull, signed_margin
+from bluefoot_mpc.types import LEGS, FloatArray
+from bluefoot_mpc.viz.packing import envelope, pack, stretches, stride_for
+from bluefoot_mpc.viz.series import RunSeries
+from bluefoot_mpc.viz.style import BAD, COM, COMMAND, ESTIMATE, LEG_COLOURS, NEUTRAL, SUPPORT, ZMP
+
+LIMIT = 4000
+"""Most points of one line."""
+
+Trace = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Panel:
+    """One figure of the report.
+
+    Attributes:
+        key: its anchor in the page.
+        title: heading.
+        caption: what it shows and how to read it.
+        data: plotly traces.
+        layout: plotly layout.
+        height: px.
+        wide: True for the full width of the page.
+        time: True when x is the run's time, so that it takes part in zoom and cursor.
+        window: s shown at a time, paging along with the replay; 0 shows the whole run.
+    """
+
+    key: str
+    title: str
+    caption: str
+    data: list[Trace]
+    layout: dict[str, Any] = field(default_factory=dict)
+    height: int = 300
+    wide: bool = False
+    time: bool = True
+    window: float = 0.0
+
+
+def curve(
+    x: FloatArray,
+    y: FloatArray,
+    name: str,
+    colour: str,
+    *,
+    axis: str = "y",
+    dash: str = "solid",
+    width: float = 1.6,
+) -> Trace:
+    """A line over time; very long ones keep their peaks and lose the points between."""
+    times, values = envelope(x, np.asarray(y, dtype=np.float64)[:, None], LIMIT)
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": pack(times),
+        "y": pack(values[:, 0]),
+        "name": name,
+        "yaxis": axis,
+        "line": {"color": colour, "dash": dash, "width": width},
+        "hovertemplate": "%{y:.3g}",
+    }
+
+
+def rows(count: int, titles: list[str], gap: float = 0.09) -> dict[str, Any]:
+    """Layout of `count` plots above each other that share the time axis; the first is on top."""
+    share = (1.0 - gap * (count - 1)) / count
+    layout: dict[str, Any] = {}
+    for index, title in enumerate(titles):
+        top = 1.0 - index * (share + gap)
+        name = "yaxis" if index == 0 else f"yaxis{index + 1}"
+        layout[name] = {"domain": [max(0.0, top - share), top], "title": {"text": title}}
+    anchor = "y" if count == 1 else f"y{count}"
+    layout["xaxis"] = {"title": {"text": "time (s)"}, "anchor": anchor}
+    return layout
+
+
+def footfall(series: RunSeries, period: float) -> Panel:
+    """Gait diagram: scheduled stance as wide pale bars, contact as narrow full ones."""
+    traces: list[Trace] = []
+    for index, leg in enumerate(LEGS):
+        level = float(len(LEGS) - 1 - index)
+        for active, width, opacity, kind in (
+            (series.scheduled[:, index], 22, 0.28, "scheduled"),
+            (series.loaded[:, index] if series.has_truth else series.switch[:, index], 8, 1.0, "measured"),
+        ):
+            spans = stretches(active, series.time, period)
+            x = [value for a, b in spans for value in (a, b, np.nan)]
+            traces.append(
+                {
+                    "type": "scatter",
+                    "mode": "lines",
+                    "x": pack(x),
+                    "y": pack([level] * len(x)),
+                    "name": f"{leg} {kind}",
+                    "legendgroup": kind,
+                    "showlegend": False,
+                    "opacity": opacity,
+                    "line": {"color": LEG_COLOURS[leg], "width": width},
+                    "hoverinfo": "x+name",
+                }
+            )
+    window = _gait_window(series)
+    layout = {
+        "yaxis": {
+            "tickvals": [3, 2, 1, 0],
+            "ticktext": list(LEGS),
+            "range": [-0.6, 3.6],
+            "fixedrange": True,
+            "showgrid": False,
+        },
+        "xaxis": {"title": {"text": "time (s)"}, "range": window},
+        "hovermode": "closest",
+        "margin": {"t": 8},
+    }
+    source = "ground force" if series.has_truth else "foot switches"
+    return Panel(
+        key="footfall",
+        title="Footfall",
+        data=traces,
+        layout=layout,
+        height=230,
+        wide=True,
+        window=window[1] - window[0],
+        caption=f"Wide pale bars: the gait wants the foot to stand. Narrow bars: it does ({source}).",
+    )
+
+
+def attitude(series: RunSeries) -> Panel:
+    """Roll, pitch and yaw: truth, estimate and command."""
+    traces: list[Trace] = []
+    degrees = np.degrees
+    for index in range(3):
+        axis = "y" if index == 0 else f"y{index + 1}"
+        lines = [("estimate", series.rpy_estimate, ESTIMATE, "solid", 1.4)]
+        if series.has_truth:
+            lines.insert(0, ("truth", series.rpy_truth, "@ink", "solid", 1.6))
+        if index < 2:
+            lines.append(("commanded", series.rpy_command, COMMAND, "dash", 1.6))
+        for name, values, colour, dash, width in lines:
+            angle = np.unwrap(values[:, index]) if index == 2 else values[:, index]
+            trace = curve(series.time, degrees(angle), name, colour, axis=axis, dash=dash, width=width)
+            traces.append({**trace, "legendgroup": name, "showlegend": index == 0})
+    layout = rows(3, ["roll (°)", "pitch (°)", "yaw (°)"])
+    return Panel(
+        key="attitude",
+        title="Trunk attitude",
+        data=traces,
+        layout=layout,
+        height=460,
+        wide=True,
+        caption="Roll: right side down is positive; pitch: nose down; yaw: left.",
+    )
+
+
+def motion(series: RunSeries) -> Panel:
+    """Speeds of the trunk against their commands, and its height."""
+    traces: list[Trace] = []
+    for index, axis in ((0, "y"), (1, "y2")):
+        if series.has_truth:
+            traces.append(
+                curve(
+                    series.time, 1e3 * series.velocity_truth[:, index], "truth", "@ink", axis=axis, width=1.2
+                )
+            )
+        traces.append(
+            curve(
+                series.time,
+                1e3 * series.velocity_estimate[:, index],
+                "estimate",
+                ESTIMATE,
+                axis=axis,
+                width=1.2,
+            )
+        )
+        traces.append(
+            curve(
+                series.time,
+                1e3 * series.velocity_command[:, index],
+                "commanded",
+                COMMAND,
+                axis=axis,
+                dash="dash",
+            )
+        )
+    for trace in traces[len(traces) // 2 :]:
+        trace["showlegend"] = False
+    traces.append(
+        {**curve(series.time, 1e3 * series.height, "height", NEUTRAL, axis="y3"), "showlegend": False}
+    )
+    return Panel(
+        key="motion",
+        title="Trunk speed and height",
+        data=traces,
+        height=430,
+        layout=rows(3, ["forward (mm/s)", "left (mm/s)", "height (mm)"]),
+        caption="In the trunk's own heading.",
+    )
+
+
+def balance(series: RunSeries) -> Panel:
+    """How far the ZMP lies inside the support, over time."""
+    pick = slice(None, None, stride_for(len(series.time), LIMIT))
+    time, feet, stance = series.time[pick], series.feet[pick, :, :2], series.scheduled[pick]
+    lines = [("assumed by the controller", series.zmp_plan[pick], COMMAND, "dash")]
+    if series.has_truth:
+        lines.insert(0, ("measured", series.zmp[pick], ZMP, "solid"))
+    traces = [
+        curve(time, 1e3 * _margins(points, feet, stance), name, colour, dash=dash, width=1.3)
+        for name, points, colour, dash in lines
+    ]
+    edge = {
+        "type": "line",
+        "xref": "paper",
+        "x0": 0,
+        "x1": 1,
+        "y0": 0,
+        "y1": 0,
+        "line": {"color": BAD, "width": 1},
+    }
+    return Panel(
+        key="balance",
+        title="ZMP margin",
+        data=traces,
+        height=430,
+        layout={**rows(1, ["margin (mm)"]), "shapes": [edge]},
+        caption="Distance of the ZMP to the edge of the scheduled feet's hull; outside is negative. "
+        "Two feet span a line, so that a trot is at zero at best.",
+    )
+
+
+def path(series: RunSeries) -> Panel:
+    """The way over ground from above: trunk, footprints, and support polygons of the last steps."""
+    pick = slice(None, None, stride_for(len(series.time), LIMIT))
+    x, y = series.q[pick, 0], series.q[pick, 1]
+    traces: list[Trace] = [_polygons(series)]
+    for index, leg in enumerate(LEGS):
+        prints = _footprints(series, index)
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "x": pack(prints[:, 0]),
+                "y": pack(prints[:, 1]),
+                "name": leg,
+                "marker": {"color": LEG_COLOURS[leg], "size": 6, "opacity": 0.8},
+                "hovertemplate": f"{leg} foot<br>x %{{x:.3f}} m, y %{{y:.3f}} m<extra></extra>",
+            }
+        )
+    lines = [("trunk", x, y, "@ink"), ("centre of mass", series.com[pick, 0], series.com[pick, 1], COM)]
+    for name, u, v, colour in lines:
+        if np.isfinite(u).any():
+            traces.append(
+                {
+                    "type": "scatter",
+                    "mode": "lines",
+                    "x": pack(u),
+                    "y": pack(v),
+                    "name": name,
+                    "line": {"color": colour, "width": 1.6},
+                    "hovertemplate": "x %{x:.3f} m, y %{y:.3f} m",
+                }
+            )
+    layout = {
+        "xaxis": {"title": {"text": "x, forward at the start (m)"}},
+        "yaxis": {"title": {"text": "y, left (m)"}, "scaleanchor": "x", "scaleratio": 1},
+        "hovermode": "closest",
+    }
+    return Panel(
+        key="path",
+        title="Path from above",
+        data=traces,
+        layout=layout,
+        height=380,
+        wide=True,
+        time=False,
+        caption="Where each foot came down, the way of the trunk, and the support polygons of the last "
+        "cycles. Zoom in to see single steps.",
+    )
+
+
+def _margins(points: FloatArray, feet: FloatArray, stance: np.ndarray[Any, Any]) -> FloatArray:
+    margins = np.full(len(points), np.nan)
+    for k in range(len(points)):
+        if np.isfinite(points[k]).all() and stance[k].any():
+            margins[k] = signed_margin(points[k], convex_hull(feet[k][stance[k]]))
+    return margins
+
+
+def _polygons(series: RunSeries, stretch: float = 2.0) -> Trace:
+    """Outlines of the support in the last `stretch` seconds of walking, each time it changes."""
+    moving = np.flatnonzero(series.walking)
+    last = int(moving[-1]) if len(moving) else len(series.time) - 1
+    first = int(np.searchsorted(series.time, series.time[last] - stretch))
+    x: list[float] = []
+    y: list[float] = []
+    before = None
+    for k in range(first, last + 1):
+        stance = tuple(series.scheduled[k])
+        if stance == before or not any(stance):
+            continue
+        before = stance
+        corners = convex_hull(series.feet[k, list(stance), :2])
+        x += [*corners[:, 0], corners[0, 0], np.nan]
+        y += [*corners[:, 1], corners[0, 1], np.nan]
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": pack(x),
+        "y": pack(y),
+        "name": "support, last 2 s",
+        "line": {"color": SUPPORT, "width": 1},
+        "fill": "toself",
+        "fillcolor": "rgba(18,161,124,0.07)",
+        "hoverinfo": "skip",
+    }
+
+
+def _footprints(series: RunSeries, leg: int) -> FloatArray:
+    """(k, 2) m, where a foot stood each time that it was set down."""
+    loaded = series.loaded[:, leg]
+    landings = np.flatnonzero(loaded & ~np.concatenate([[False], loaded[:-1]]))
+    # A moment later the foot has settled.
+    settled = np.minimum(landings + 2, len(loaded) - 1)
+    return series.feet[settled, leg, :2]
+
+
+def _gait_window(series: RunSeries) -> list[float]:
+    """A few cycles to begin with: the window of the run that the replay starts in."""
+    width = min(6.0, max(series.duration, 0.1))
+    start = width * np.floor(replay_start(series) / width)
+    return [float(start), float(start + width)]
+
+
+def replay_start(series: RunSeries) -> float:
+    """Time (s) at which the replay opens: just before the robot first walks."""
+    moving = np.flatnonzero(series.walking)
+    return max(0.0, float(series.time[moving[0]]) - 0.3) if len(moving) else 0.0

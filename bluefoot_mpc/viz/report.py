@@ -1,0 +1,206 @@
+"""A run as one self-contained page: verdict, key figures, 3D replay and plots. Opens offline."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from bluefoot_mpc.model.robot import RobotModel
+from bluefoot_mpc.runtime.data import RunData
+from bluefoot_mpc.settings import dump_toml
+from bluefoot_mpc.viz import plots, plots_machine
+from bluefoot_mpc.viz.animation import animation_data, viewer_script
+from bluefoot_mpc.viz.packing import stretches
+from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
+from bluefoot_mpc.viz.plots import Panel
+from bluefoot_mpc.viz.scene import build_scene
+from bluefoot_mpc.viz.series import RunSeries, extract
+from bluefoot_mpc.viz.style import BAD, NEUTRAL
+from bluefoot_mpc.viz.verdict import facts, number, tiles, verdict
+
+SERVO_TEMPERATURE_LIMIT = 70.0
+"""°C at which an AX-12A switches itself off (its control table's default)."""
+_MAX_EVENTS = 400
+
+
+def write_report(
+    run: RunData,
+    summary: Mapping[str, Any],
+    robot: RobotModel,
+    path: Path,
+    checks: Sequence[Mapping[str, Any]] = (),
+) -> None:
+    """Write the report of a run.
+
+    Args:
+        run: what was recorded; truth may be missing (hardware).
+        summary: the run's figures, as in ``summary.json``.
+        robot: the robot that ran.
+        path: file to write.
+        checks: the scenario's criteria: ``name``, ``holds`` and ``detail`` of each.
+    """
+    path.write_text(report_html(run, summary, robot, checks), encoding="utf-8")
+
+
+def report_html(
+    run: RunData,
+    summary: Mapping[str, Any],
+    robot: RobotModel,
+    checks: Sequence[Mapping[str, Any]] = (),
+) -> str:
+    """The report as text; arguments as in `write_report`."""
+    stall_torque = robot.parameters.servo.stall_torque
+    series = extract(run, stall_torque)
+    has_ticks = len(series.time) > 0
+    panels = _panels(series, stall_torque, run.period) if has_ticks else []
+    judged = verdict(summary, checks)
+    data = animation_data(build_scene(robot), series, robot.parameters.legs.foot_radius) if has_ticks else {}
+    return render(
+        "report.html.j2",
+        title=f"{judged.word}: {summary.get('scenario') or 'run'}, seed {summary.get('seed')}",
+        verdict=judged,
+        facts=facts(summary),
+        checks=checks,
+        tiles=tiles(summary, stall_torque, run.period),
+        has_ticks=has_ticks,
+        has_truth=series.has_truth,
+        plots_follow=True,
+        panels=panels,
+        run_data=embed_json(data),
+        figures=embed_json(_figures(panels, series)),
+        viewer_script=embed_script(viewer_script()) if has_ticks else "",
+        plotly_script=embed_script(_plotly_script()),
+        player_script=embed_script(template_text("player.js")),
+        report_script=embed_script(template_text("report.js")),
+        configuration=dump_toml(run.config).strip() or "none recorded",
+        versions=sorted((summary.get("versions") or {}).items()),
+        all_figures=_flat(summary),
+        footer=_footer(series, len(run.telemetry)),
+        **_events(series),
+    )
+
+
+def _panels(series: RunSeries, stall_torque: float, period: float) -> list[Panel]:
+    return [
+        plots.footfall(series, period),
+        plots.attitude(series),
+        plots.path(series),
+        plots.balance(series),
+        plots.motion(series),
+        plots_machine.torques(series, stall_torque),
+        plots_machine.torque_strip(series, stall_torque),
+        plots_machine.temperatures(series, SERVO_TEMPERATURE_LIMIT),
+        plots_machine.tick_times(series, period),
+    ]
+
+
+def _figures(panels: Sequence[Panel], series: RunSeries) -> dict[str, Any]:
+    """Figures for the page's script, with pushes and mode changes drawn into every time axis."""
+    start = plots.replay_start(series) if len(series.time) else 0.0
+    figures: dict[str, Any] = {"start": start, "duration": series.duration}
+    for panel in panels:
+        layout = dict(panel.layout)
+        if panel.time:
+            layout["shapes"] = [*_marks(series), *layout.get("shapes", [])]
+            layout["xaxis"] = {"range": [0.0, series.duration], **layout["xaxis"]}
+        figures[panel.key] = {
+            "data": panel.data,
+            "layout": layout,
+            "time": panel.time,
+            "follow": panel.window > 0.0,
+            "window": panel.window,
+            "full": layout["xaxis"].get("range"),
+        }
+    return figures
+
+
+def _marks(series: RunSeries) -> list[dict[str, Any]]:
+    shapes: list[dict[str, Any]] = []
+    for k in range(1, len(series.mode)):
+        if series.mode[k] != series.mode[k - 1]:
+            shapes.append(_band(float(series.time[k]), float(series.time[k]), NEUTRAL))
+    pushed = (series.push != 0.0).any(axis=1)
+    step = float(series.time[1] - series.time[0]) if len(series.time) > 1 else 0.0
+    shapes += [_band(start, end, BAD) for start, end in stretches(pushed, series.time, step)]
+    return shapes
+
+
+def _band(start: float, end: float, colour: str) -> dict[str, Any]:
+    if start == end:
+        line = {"color": colour, "width": 1, "dash": "dot"}
+        return {"type": "line", "yref": "paper", "x0": start, "x1": end, "y0": 0, "y1": 1, "line": line}
+    return {
+        "type": "rect",
+        "yref": "paper",
+        "x0": start,
+        "x1": end,
+        "y0": 0,
+        "y1": 1,
+        "fillcolor": colour,
+        "opacity": 0.25,
+        "line": {"width": 0},
+        "layer": "below",
+    }
+
+
+def _events(series: RunSeries) -> dict[str, Any]:
+    """Events with equal ones in a row put together, and a caption that tells what was left out."""
+    grouped: list[dict[str, Any]] = []
+    for time, text in _with_pushes(series):
+        last = next((group for group in reversed(grouped[-4:]) if group["text"] == text), None)
+        if last is not None and time - last["end"] < 0.5:
+            last.update(end=time, count=last["count"] + 1)
+        else:
+            grouped.append({"time": round(time, 4), "end": time, "text": text, "count": 1})
+    shown = grouped[:_MAX_EVENTS]
+    for event in shown:
+        event["label"] = f"{event['time']:.2f} s"
+        if event["count"] > 1:
+            event["text"] += f" (for {event['end'] - event['time']:.2f} s, {event['count']} ticks)"
+    caption = "Mode changes, limits met and pushes; press a time to go there in the replay."
+    if not shown:
+        caption = "Nothing out of the ordinary happened."
+    elif len(grouped) > len(shown):
+        caption = f"The first {len(shown)} of {len(grouped)}. {caption}"
+    return {"events": shown, "events_caption": caption}
+
+
+def _with_pushes(series: RunSeries) -> list[tuple[float, str]]:
+    found = list(series.events)
+    pushed = (series.push != 0.0).any(axis=1)
+    step = float(series.time[1] - series.time[0]) if len(series.time) > 1 else 0.0
+    for start, end in stretches(pushed, series.time, step):
+        force = series.push[int(series.time.searchsorted(start))]
+        size, lasted = float((force @ force) ** 0.5), end - start
+        text = f"push of {number(size, 1)} N for {lasted:.2f} s, {number(size * lasted, 2)} N·s"
+        found.append((start, text))
+    return sorted(found, key=lambda event: event[0])
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
+    rows: list[tuple[str, str]] = []
+    for key, value in table.items():
+        if key == "versions":
+            continue
+        if isinstance(value, Mapping):
+            rows += _flat(value, f"{prefix}{key}.")
+        else:
+            text = f"{value:.6g}" if isinstance(value, float) else "–" if value is None else str(value)
+            rows.append((prefix + key, text))
+    return rows
+
+
+def _footer(series: RunSeries, ticks: int) -> str:
+    source = (
+        "Curves named truth come from the simulator and were not known to the controller."
+        if series.has_truth
+        else "This run has no simulator truth: everything is drawn from the robot's own measurements and estimates."
+    )
+    return f"{ticks} ticks. {source} Angles: roll right side down, pitch nose down, yaw left positive."
+
+
+def _plotly_script() -> str:
+    from plotly.offline import get_plotlyjs  # noqa: PLC0415 - half a second that only a report needs
+
+    return str(get_plotlyjs())

@@ -1,0 +1,136 @@
+"use strict";
+// Draws the figures, keeps their time axes together, and ties them to the replay's clock.
+(function () {
+  const figures = JSON.parse(document.getElementById("figures").textContent);
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const root = document.getElementById("replay");
+  const replay = root ? startReplay(root, JSON.parse(document.getElementById("run-data").textContent)) : null;
+  const drawn = [];
+
+  // Colours beginning with "@" are the page's own and change with its theme.
+  function themed(value, colour) {
+    if (typeof value === "string") return value.startsWith("@") ? colour("--" + value.slice(1)) : value;
+    if (Array.isArray(value)) return value.map((item) => themed(item, colour));
+    if (value && typeof value === "object" && value.bdata === undefined) {
+      return Object.fromEntries(Object.entries(value).map(([key, item]) => [key, themed(item, colour)]));
+    }
+    return value;
+  }
+
+  function layoutFor(figure, colour) {
+    const layout = themed(figure.layout, colour);
+    const axis = { gridcolor: colour("--line"), zerolinecolor: colour("--line"), linecolor: colour("--line"), tickcolor: colour("--line"), zeroline: false, title: { standoff: 8 } };
+    for (const key of Object.keys(layout)) {
+      if (/^[xy]axis\d*$/.test(key)) layout[key] = { ...axis, automargin: key[0] === "y", ...layout[key], title: { ...axis.title, ...layout[key].title } };
+    }
+    return {
+      ...layout,
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", hovermode: layout.hovermode || "x unified", dragmode: "zoom",
+      font: { family: "system-ui, -apple-system, Segoe UI, Roboto, Arial, sans-serif", size: 12, color: colour("--muted") },
+      hoverlabel: { bgcolor: colour("--card"), bordercolor: colour("--line"), font: { color: colour("--ink") } },
+      legend: { orientation: "h", x: 0, y: 1.01, xanchor: "left", yanchor: "bottom" },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("--line"), activecolor: colour("--accent") },
+      margin: { l: 56, r: 14, t: 30, b: 44, ...layout.margin },
+    };
+  }
+
+  function draw() {
+    const css = getComputedStyle(document.documentElement), colour = (name) => css.getPropertyValue(name).trim();
+    for (const node of document.querySelectorAll("[data-figure]")) {
+      const figure = figures[node.dataset.figure];
+      Plotly.react(node, themed(figure.data, colour), layoutFor(figure, colour), { displaylogo: false, responsive: true, modeBarButtons: [["zoom2d", "pan2d", "resetScale2d", "toImage"]] });
+      if (!node.dataset.tied) tie(node, figure);
+    }
+  }
+
+  function tie(node, figure) {
+    node.dataset.tied = "yes";
+    drawn.push({ node, figure });
+    if (!figure.time) return;
+    const line = document.createElement("div");
+    line.className = "cursor";
+    node.appendChild(line);
+    drawn[drawn.length - 1].line = line;
+    node.on("plotly_click", (event) => { if (replay && event.points.length) replay.clock.seek(event.points[0].x); });
+    node.on("plotly_relayout", (change) => {
+      if (busy) return;
+      if (change["xaxis.range[0]"] !== undefined) together(node, [change["xaxis.range[0]"], change["xaxis.range[1]"]]);
+      else if (change["xaxis.autorange"]) together(node, null);
+      placeCursors();
+    });
+  }
+
+  let busy = false;
+  async function together(source, range) {
+    windowWidth = 0;
+    busy = true;
+    for (const { node, figure } of drawn) {
+      if (!figure.time || (node === source && range)) continue;
+      await Plotly.relayout(node, { "xaxis.range": range || figure.full });
+    }
+    busy = false;
+    placeCursors();
+  }
+
+  function placeCursors() {
+    if (!replay) return;
+    const t = replay.clock.time;
+    for (const { node, line } of drawn) {
+      const full = node._fullLayout;
+      if (!line || !full || !full.xaxis) continue;
+      const inside = full.xaxis.l2p(t), size = full._size;
+      const visible = inside >= 0 && inside <= full.xaxis._length;
+      line.style.display = visible ? "block" : "none";
+      if (!visible) continue;
+      line.style.left = `${size.l + inside}px`;
+      line.style.top = `${size.t}px`;
+      line.style.height = `${size.h}px`;
+    }
+  }
+
+  // Figures that show a window of the run page along with the replay.
+  function page(t) {
+    if (busy) return;
+    for (const { node, figure } of drawn) {
+      const width = windowWidth || (figure.follow ? figure.window : 0);
+      if (!figure.time || !width) continue;
+      const [low, high] = node._fullLayout.xaxis.range;
+      if (t >= low && t <= high && Math.abs(high - low - width) < 1e-6) continue;
+      if (!windowWidth && t >= low && t <= high) continue;
+      const start = Math.max(0, Math.min(Math.floor(t / width) * width, figures.duration));
+      relayout(node, [start, start + width]);
+    }
+  }
+
+  function relayout(node, range) {
+    busy = true;
+    Plotly.relayout(node, { "xaxis.range": range }).then(() => { busy = false; placeCursors(); });
+  }
+
+  let windowWidth = 0;
+  function chooseWindow(width) {
+    windowWidth = width;
+    for (const { node, figure } of drawn) {
+      if (figure.time && !width) relayout(node, figure.full);
+    }
+    if (replay) page(replay.clock.time);
+  }
+
+  draw();
+  dark.addEventListener("change", draw);
+  addEventListener("resize", () => setTimeout(placeCursors, 60));
+  if (replay) {
+    replay.clock.watch((t) => { placeCursors(); page(t); });
+    const chooser = document.querySelector("[data-role=window]");
+    if (chooser) chooser.onchange = () => chooseWindow(Number(chooser.value));
+    for (const button of document.querySelectorAll("[data-seek]")) {
+      button.onclick = () => { replay.clock.seek(Number(button.dataset.seek)); root.scrollIntoView({ block: "nearest" }); };
+    }
+    replay.clock.seek(Math.min(figures.start || 0, replay.clock.duration));
+    const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if (!calm) new IntersectionObserver((entries, observer) => {
+      if (entries.some((entry) => entry.isIntersecting)) { observer.disconnect(); replay.clock.toggle(true); }
+    }, { threshold: 0.4 }).observe(root);
+    window.replay = replay;
+  }
+})();

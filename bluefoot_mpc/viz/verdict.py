@@ -1,0 +1,280 @@
+"""What a summary says in words and key figures: the head of the report."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+_MARKS = {"good": "✓", "warn": "!", "bad": "✕", "": ""}
+_MINUS = "\u2212"
+
+_DID = {
+    "stand": "stood",
+    "pose": "moved its trunk",
+    "walk": "walked",
+    "turn": "turned",
+    "transition": "changed its gait while walking",
+    "push": "withstood the push",
+    "drive": "was driven",
+}
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Verdict:
+    """Outcome of a run in one line.
+
+    Attributes:
+        status: ``good``, ``warn`` or ``bad``.
+        word: one word for the badge.
+        headline: one sentence.
+        explanation: what it rests on, or why it went wrong.
+    """
+
+    status: str
+    word: str
+    headline: str
+    explanation: str
+
+    @property
+    def mark(self) -> str:
+        """Sign beside the word, for those who cannot tell the colours."""
+        return _MARKS[self.status]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Tile:
+    """One key figure.
+
+    Attributes:
+        label: what it is.
+        value: number as text.
+        unit: its unit; may be empty.
+        note: goal or remark.
+        status: ``good``, ``warn``, ``bad`` or empty (not judged).
+    """
+
+    label: str
+    value: str
+    unit: str = ""
+    note: str = ""
+    status: str = ""
+
+    @property
+    def mark(self) -> str:
+        """Sign for those who cannot tell the colours."""
+        return _MARKS[self.status]
+
+
+def verdict(summary: Mapping[str, Any], checks: Sequence[Mapping[str, Any]] = ()) -> Verdict:
+    """Judge a run by its summary.
+
+    Args:
+        summary: the summary, as in ``summary.json``.
+        checks: the scenario's criteria: ``name``, ``holds`` and ``detail`` of each.
+    """
+    did = _DID.get(str(summary.get("scenario")), "completed the run")
+    reason = str(summary.get("stop_reason") or "completed")
+    lasted = f"{number(summary.get('duration_s'), 1)} s"
+    failed = [check for check in checks if not check.get("holds")]
+    if summary.get("fell"):
+        why = reason if reason != "completed" else "the trunk or a link above a foot touched the ground"
+        return Verdict(
+            status="bad", word="Fell", headline=f"The robot fell after {lasted}", explanation=_sentence(why)
+        )
+    if reason == "interrupted":
+        return Verdict(
+            status="warn",
+            word="Interrupted",
+            headline=f"Interrupted after {lasted}",
+            explanation="The run was ended by hand; the robot sat down and was switched off.",
+        )
+    if reason != "completed":
+        headline = f"The run was stopped after {lasted}"
+        return Verdict(status="bad", word="Stopped", headline=headline, explanation=_sentence(reason))
+    if not summary.get("success", True):
+        missed = "; ".join(f"{check['name']}: {check['detail']}" for check in failed)
+        return Verdict(
+            status="bad",
+            word="Criteria missed",
+            headline=f"The robot {did}, but missed {_count(failed)} of its criteria",
+            explanation=_sentence(missed or "the scenario's criteria do not hold"),
+        )
+    return Verdict(
+        status="good",
+        word="Success",
+        headline=f"The robot {did}{_extent(summary)}",
+        explanation=_sentence(
+            "; ".join(f"{c['name']} ({c['detail']})" for c in checks) or "every criterion holds"
+        ),
+    )
+
+
+def facts(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What was run: names and values for the line under the headline."""
+    found = [
+        (key, str(summary[key])) for key in ("scenario", "gait", "controller", "robot") if summary.get(key)
+    ]
+    if summary.get("seed") is not None:
+        found.append(("seed", str(summary["seed"])))
+    if summary.get("duration_s") is not None:
+        found.append(("duration", f"{number(summary['duration_s'], 1)} s"))
+    if summary.get("real_time_factor"):
+        found.append(("real-time factor", f"{number(summary['real_time_factor'], 1)} ×"))
+    if summary.get("config_sha256"):
+        found.append(("configuration", str(summary["config_sha256"])[:10]))
+    return found
+
+
+def tiles(summary: Mapping[str, Any], stall_torque: float, period: float) -> list[Tile]:
+    """Key figures with their goals; figures that a run does not have are left out.
+
+    Goals: speed within 10 %, drift under 10 % of the distance, 8 mm of swing
+    clearance, attitude by gait and speed, servos below their limits.
+
+    Args:
+        summary: the summary.
+        stall_torque: N·m.
+        period: s, command period.
+    """
+    tilt = attitude_goal(summary)
+    distance = summary.get("distance_m")
+    wanted = summary.get("speed_ref_mps")
+    walks = bool(wanted)
+    ticks = summary.get("tick_us") or {}
+    makers: list[Tile | None] = [
+        _tile("Distance", distance, 2, "m") if walks else None,
+        _speed_tile(summary) if walks else None,
+        _tile(
+            "Sideways drift",
+            summary.get("lateral_drift_m"),
+            0,
+            "mm",
+            scale=1e3,
+            goal="goal ≤ 10 % of distance",
+            holds=lambda x: abs(x) <= 0.1 * abs(distance or 0.0),
+        )
+        if walks
+        else None,
+        _tile("Heading drift", summary.get("yaw_drift_deg"), 1, "°"),
+        _tile(
+            "Roll, RMS", summary.get("roll_rms_deg"), 2, "°", goal=f"goal ≤ {tilt:g}°", holds=lambda x: x <= tilt
+        ),
+        _tile(
+            "Pitch, RMS", summary.get("pitch_rms_deg"), 2, "°", goal=f"goal ≤ {tilt:g}°", holds=lambda x: x <= tilt
+        ),
+        _tile(
+            "Attitude error, RMS",
+            summary.get("attitude_error_rms_deg"),
+            2,
+            "°",
+            goal="of the estimate, goal ≤ 0.3°",
+            holds=lambda x: x <= 0.3,
+        ),
+        _tile(
+            "Swing clearance",
+            summary.get("swing_clearance_median_m"),
+            1,
+            "mm",
+            scale=1e3,
+            goal="median, goal ≥ 8 mm",
+            holds=lambda x: x >= 0.008,
+        ),
+        _tile("ZMP inside support", summary.get("zmp_inside_fraction"), 0, "%", scale=100.0),
+        _tile("ZMP margin, least", summary.get("zmp_margin_min_m"), 0, "mm", scale=1e3),
+        _tile(
+            "Torque, peak",
+            summary.get("torque_peak_nm"),
+            2,
+            "N·m",
+            goal=f"stall {stall_torque:g} N·m",
+            holds=lambda x: x <= stall_torque,
+        ),
+        _tile("Torque, RMS", summary.get("torque_rms_nm"), 2, "N·m"),
+        _tile(
+            "Hottest servo",
+            summary.get("servo_temp_max_c"),
+            0,
+            "°C",
+            goal="limit 70 °C",
+            holds=lambda x: x < 65.0,
+        ),
+        _tile("Energy", summary.get("energy_j"), 0, "J"),
+        _tile("Cost of transport", summary.get("cost_of_transport"), 1),
+        _tile(
+            "Tick, 99 %",
+            ticks.get("p99"),
+            0,
+            "µs",
+            goal=f"deadline {1e3 * period:g} ms",
+            holds=lambda x: x < 1e6 * period,
+        ),
+        _tile("Deadline misses", summary.get("deadline_misses"), 0, holds=lambda x: x == 0),
+        _tile("QP failures", summary.get("qp_failures"), 0, holds=lambda x: x == 0),
+    ]
+    return [tile for tile in makers if tile is not None]
+
+
+def attitude_goal(summary: Mapping[str, Any]) -> float:
+    """Degrees RMS that roll and pitch should stay under: by gait, and for trot by speed."""
+    if not summary.get("speed_ref_mps"):
+        return 2.5
+    if summary.get("gait") == "walk":
+        return 2.0
+    return 1.0 if summary["speed_ref_mps"] <= 0.0605 else 1.5
+
+
+def number(value: Any, digits: int, scale: float = 1.0) -> str:
+    """A number as text with a true minus sign; a dash where there is none."""
+    if value is None or not math.isfinite(float(value)):
+        return "–"
+    text = f"{scale * float(value):.{digits}f}"
+    if float(text) == 0.0:
+        text = text.removeprefix("-")
+    return text.replace("-", _MINUS)
+
+
+def _speed_tile(summary: Mapping[str, Any]) -> Tile | None:
+    wanted = float(summary["speed_ref_mps"])
+    return _tile(
+        "Speed",
+        summary.get("speed_mps"),
+        1,
+        "mm/s",
+        scale=1e3,
+        goal=f"commanded {number(wanted, 0, 1e3)} ± 10 %",
+        holds=lambda x: abs(x - wanted) <= 0.1 * wanted,
+    )
+
+
+def _tile(
+    label: str,
+    value: Any,
+    digits: int,
+    unit: str = "",
+    *,
+    scale: float = 1.0,
+    goal: str = "",
+    holds: Callable[[float], bool] | None = None,
+) -> Tile | None:
+    if value is None:
+        return None
+    status = "" if holds is None else "good" if holds(float(value)) else "bad"
+    return Tile(label=label, value=number(value, digits, scale), unit=unit, note=goal, status=status)
+
+
+def _extent(summary: Mapping[str, Any]) -> str:
+    distance, speed = summary.get("distance_m"), summary.get("speed_mps")
+    if not summary.get("speed_ref_mps") or distance is None or speed is None:
+        return f" for {number(summary.get('duration_s'), 0)} s"
+    return f" {number(distance, 2)} m at {number(speed, 0, 1e3)} mm/s"
+
+
+def _count(failed: Sequence[Mapping[str, Any]]) -> str:
+    return {0: "some", 1: "one", 2: "two", 3: "three"}.get(len(failed), str(len(failed)))
+
+
+def _sentence(text: str) -> str:
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
