@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import sys
 import time as clock
 from collections.abc import Callable
@@ -89,7 +91,33 @@ class Session:
         return self._teleop.command(state, time)
 
     def _print(self, text: str) -> None:
-        self._screen.write("\r\x1b[K" + text.replace("\n", "\r\n") + "\r\n")
+        self._screen.write(f"\r\x1b[K{text}\n")
+
+
+class AboveStatus(io.TextIOBase):
+    """Standard error during a drive: messages push the status line down instead of running into it.
+
+    It says that it is no terminal, so that nobody draws a progress bar into the line.
+
+    Args:
+        screen: the terminal.
+    """
+
+    def __init__(self, screen: TextIO) -> None:
+        self._screen = screen
+
+    def isatty(self) -> bool:
+        """No: bars and colours stay out of the way of the status line."""
+        return False
+
+    def write(self, text: str) -> int:
+        """Write a message over the status line, which is drawn again below."""
+        self._screen.write(f"\r\x1b[K{text}")
+        return len(text)
+
+    def flush(self) -> None:
+        """Show what was written."""
+        self._screen.flush()
 
 
 def pace() -> Callable[[float], None]:
@@ -130,8 +158,9 @@ def drive(command: DriveCommand) -> Outcome:
             screen=screen,
         )
         try:
-            result = run_commanded(session, resolved, options)
+            with contextlib.redirect_stderr(AboveStatus(screen)):
+                result = run_commanded(session, resolved, options)
         finally:
             gamepad.close()
-            screen.write("\n")
+            screen.write("\r\x1b[K")
     return outcome_of(result)

@@ -76,7 +76,8 @@ def _show(outcome: Outcome, as_json: bool) -> int:
         else:
             console = Console(highlight=False)
             for part in outcome.page:
-                console.print(part)
+                # Lines of text stay whole: a path or a URDF that was wrapped is of no use.
+                console.print(part, soft_wrap=isinstance(part, (str, Text)), markup=False)
             sys.stdout.flush()
     except BrokenPipeError:
         # The reader (head, less) has seen enough; keep the interpreter from flushing again at exit.

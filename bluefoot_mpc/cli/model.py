@@ -6,7 +6,6 @@ import dataclasses
 from pathlib import Path
 
 from rich.table import Table
-from rich.text import Text
 
 from bluefoot_mpc.cli.arguments import CheckCommand, PowerCommand, RomCommand, UrdfCommand
 from bluefoot_mpc.cli.outcome import FAILED, OK, Outcome
@@ -43,7 +42,7 @@ def urdf(command: UrdfCommand) -> Outcome:
     if command.check:
         return _check_urdf(text, command.out or source.with_suffix(".urdf"), source)
     if command.out is None:
-        return Outcome(data={"urdf": text}, page=(Text(text.rstrip("\n"), no_wrap=True, overflow="ignore"),))
+        return Outcome(data={"urdf": text}, page=(text.rstrip("\n"),))
     _write(command.out, text)
     return Outcome(data={"file": command.out, "source": source}, page=(f"wrote {command.out}",))
 
@@ -60,7 +59,7 @@ def rom(command: RomCommand) -> Outcome:
     for label, key, unit in (("along x or y", "shift", "cm"), ("roll or pitch", "tilt", "deg")):
         cells = (f"±{figures[f'{key}_{ankle}_{unit}']:.1f} {unit}" for ankle in ("fixed", "free"))
         table.add_row(label, *cells)
-    page = (table, Text("\n".join(f"wrote {file}" for file in files)))
+    page = (table, "\n".join(f"wrote {file}" for file in files))
     return Outcome(data={**figures, "files": files}, page=page)
 
 
@@ -92,7 +91,7 @@ def _check_urdf(text: str, file: Path, source: Path) -> Outcome:
     fresh = file.is_file() and file.read_text(encoding="utf-8") == text
     line = f"{file} is up to date" if fresh else f"{file} is out of date: bluefoot model urdf --out {file}"
     data = {"file": file, "source": source, "up_to_date": fresh}
-    return Outcome(status=OK if fresh else FAILED, data=data, page=(Text(line),))
+    return Outcome(status=OK if fresh else FAILED, data=data, page=(line,))
 
 
 def _write(file: Path, text: str) -> None:

@@ -93,7 +93,7 @@ def _verdict(summary: Summary, criteria: Sequence[Criterion]) -> Text:
 
 def _files(folder: Path) -> Text:
     lines = [f"{name:<14} {folder / file}" for name, file in _FILES if (folder / file).is_file()]
-    return Text("\n".join(lines or [f"results        {folder}"]), no_wrap=True, overflow="ignore")
+    return Text("\n".join(lines or [f"results        {folder}"]))
 
 
 def _number(value: Any, digits: int) -> str:
