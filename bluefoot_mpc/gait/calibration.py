@@ -10,7 +10,6 @@ measured limit cycle serves every speed.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -138,20 +137,20 @@ def measure(coupling: Coupling, gain: float, alpha: float, config: CpgConfig) ->
     return LimitCycle(rhythm=rhythm, start=CpgState(y1=(a, b, c, d), y2=(e, f, g, h)), lag=lags)
 
 
-def mix(rhythms: Sequence[Rhythm], weights: Sequence[float]) -> Rhythm:
-    """Convex mixture of rhythms, for the time in which one gait becomes another."""
+def mix(first: Rhythm, second: Rhythm, weight: float) -> Rhythm:
+    """Linear mixture of two rhythms; `weight` in [0, 1] is that of the second."""
 
-    def blend(values: Sequence[float]) -> float:
-        return sum(w * v for w, v in zip(weights, values, strict=True))
+    def blend(a: float, b: float) -> float:
+        return a + weight * (b - a)
 
     return Rhythm(
-        matrix=tuple(map(blend, zip(*(r.matrix for r in rhythms), strict=True))),
-        alpha=blend([r.alpha for r in rhythms]),
-        turn=blend([r.turn for r in rhythms]),
-        share=blend([r.share for r in rhythms]),
-        apex=blend([r.apex for r in rhythms]),
-        swing_time=tuple(map(blend, zip(*(r.swing_time for r in rhythms), strict=True))),
-        stance_time=tuple(map(blend, zip(*(r.stance_time for r in rhythms), strict=True))),
+        matrix=tuple(map(blend, first.matrix, second.matrix)),
+        alpha=blend(first.alpha, second.alpha),
+        turn=blend(first.turn, second.turn),
+        share=blend(first.share, second.share),
+        apex=blend(first.apex, second.apex),
+        swing_time=tuple(map(blend, first.swing_time, second.swing_time)),
+        stance_time=tuple(map(blend, first.stance_time, second.stance_time)),
     )
 
 

@@ -68,21 +68,3 @@ def coupling(name: str) -> Coupling:
 def scaled(matrix: Sequence[float], gain: float) -> Matrix:
     """`gain` times a coupling matrix."""
     return tuple(gain * entry for entry in matrix)
-
-
-def shift_weights(weights: Sequence[float], target: int, amount: float) -> tuple[float, ...]:
-    """Move a convex mixture of gaits towards one of them.
-
-    Args:
-        weights: non-negative shares of the gaits, adding to one.
-        target: index of the gait to move to.
-        amount: how much of the whole to move, >= 0.
-
-    Returns:
-        New shares; exactly one-hot once the target is reached.
-    """
-    share = weights[target] + amount
-    if share >= 1.0 - 1e-9:
-        return tuple(float(i == target) for i in range(len(weights)))
-    shrink = (1.0 - share) / (1.0 - weights[target])
-    return tuple(share if i == target else shrink * w for i, w in enumerate(weights))

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 
-from bluefoot_mpc.gait.calibration import LimitCycle, calibrate, mix
 from bluefoot_mpc.gait.config import GaitConfig
-from bluefoot_mpc.gait.couplings import COUPLINGS, coupling, shift_weights
 from bluefoot_mpc.gait.cpg import CpgInputs, CpgIntegrator
 from bluefoot_mpc.gait.footholds import Foot, LegClock, Stride, advance_foot
 from bluefoot_mpc.gait.network import coming_to_rest, gated
 from bluefoot_mpc.gait.state import GaitState
-from bluefoot_mpc.gait.timing import cycle_time, step_height
+from bluefoot_mpc.gait.transition import Transition
 from bluefoot_mpc.gait.virtual_robot import VirtualPose
 
-NAMES = tuple(COUPLINGS)
-_LEAST_IN_TRANSITION = 2
+CYCLES_TO_CHANGE = 3.0  # fewest cycles from one gait to another; in fewer, legs stall
 
 
 class GaitEngine:
@@ -27,8 +24,7 @@ class GaitEngine:
 
     def __init__(self, config: GaitConfig) -> None:
         self.config = config
-        self.cycles = tuple(self._calibrated(name) for name in NAMES)
-        self._timings = tuple(config.timing(name) for name in NAMES)
+        self.transition = Transition(config)
         self._integrator = CpgIntegrator(config.cpg)
 
     def rest(self, nominal: tuple[complex, ...]) -> GaitState:
@@ -38,18 +34,12 @@ class GaitEngine:
             nominal: (4,) feet in b' as x + iy, m.
         """
         return GaitState(
-            cpg=self.cycles[0].start,
-            rhythm=self.cycles[0].rhythm,
+            cpg=self.transition.trot.start,
+            rhythm=self.transition.trot.rhythm,
             pose=VirtualPose(),
             feet=[Foot(nominal=place, anchor=place) for place in nominal],
-            weights=tuple(float(i == 0) for i in range(len(NAMES))),
-            target=0,
-            cycle=self._timings[0].cycle_max,
+            cycle=self.config.trot.cycle_max,
         )
-
-    def _calibrated(self, name: str) -> LimitCycle:
-        timing = self.config.timing(name)
-        return calibrate(coupling(name), timing.coupling_gain, timing.swing_share, self.config.cpg)
 
     def advance(self, state: GaitState, dt: float) -> Stride | None:
         """Advance `state` by `dt` in equal sub-steps; returns the last one's stride."""
@@ -63,9 +53,9 @@ class GaitEngine:
         if not self._start_or_rest(state):
             return None
         self._ramp(state, dt)
-        height, least = self._rhythm(state, dt)
+        self._rhythm(state, dt)
         rhythm = state.rhythm
-        self._oscillate(state, least, dt)
+        self._oscillate(state, dt)
         before = state.pose
         state.pose = before.moved(state.velocity, state.yaw_rate, dt)
         stride = Stride(
@@ -76,7 +66,7 @@ class GaitEngine:
             dt=dt,
             swing_time=rhythm.share * state.cycle,
             stance_time=(1.0 - rhythm.share) * state.cycle,
-            height=height,
+            height=self.transition.step_height(state.place, abs(state.velocity), abs(state.yaw_rate)),
             apex_y2=rhythm.apex,
             shift=state.reflex.shift,
         )
@@ -97,8 +87,9 @@ class GaitEngine:
             state.walking = state.landing = False
         if not state.walking and moving:
             state.walking = True
-            state.weights = tuple(float(i == state.target) for i in range(len(NAMES)))
-            state.cpg = self.cycles[state.target].start
+            state.place = state.target
+            cycle = self.transition.cycle(state.place)
+            state.cpg, state.rhythm = cycle.start, cycle.rhythm
         return state.walking
 
     def _ramp(self, state: GaitState, dt: float) -> None:
@@ -113,25 +104,16 @@ class GaitEngine:
         state.idle += dt / state.cycle
         state.landing = state.idle >= self.config.settle_cycles
 
-    def _rhythm(self, state: GaitState, dt: float) -> tuple[float, int]:
-        """Set rhythm and cycle time; returns step height and least stance of this step."""
-        if state.weights[state.target] < 1.0 and not state.landing:
-            state.weights = shift_weights(state.weights, state.target, dt / self.config.blend_time)
-        speed, turn = abs(state.velocity), abs(state.yaw_rate)
-        if 1.0 in state.weights:
-            index = state.weights.index(1.0)
-            timing = self._timings[index]
-            state.cycle = cycle_time(speed, turn, timing)
-            least = COUPLINGS[NAMES[index]].least_stance
-            state.rhythm = self.cycles[index].rhythm
-            return step_height(speed, turn, timing), least
-        parts = list(zip(state.weights, self._timings, strict=True))
-        state.cycle = sum(w * cycle_time(speed, turn, t) for w, t in parts)
-        height = sum(w * step_height(speed, turn, t) for w, t in parts)
-        state.rhythm = mix([c.rhythm for c in self.cycles], state.weights)
-        return height, _LEAST_IN_TRANSITION
+    def _rhythm(self, state: GaitState, dt: float) -> None:
+        """Move towards the wanted gait; set rhythm and cycle time."""
+        way = self.transition
+        if state.place != state.target and not state.landing:
+            most = dt / max(self.config.blend_time, CYCLES_TO_CHANGE * state.cycle)
+            state.place += min(most, max(-most, state.target - state.place))
+            state.rhythm = way.rhythm(state.place)
+        state.cycle = way.cycle_time(state.place, abs(state.velocity), abs(state.yaw_rate))
 
-    def _oscillate(self, state: GaitState, least: int, dt: float) -> None:
+    def _oscillate(self, state: GaitState, dt: float) -> None:
         rhythm = state.rhythm
         inputs = CpgInputs(
             omega=rhythm.turn / state.cycle,
@@ -143,6 +125,7 @@ class GaitEngine:
         if state.landing:
             state.cpg = coming_to_rest(self._integrator, state.cpg, inputs, dt)
         else:
+            least = self.transition.least_stance(state.place)
             state.cpg = gated(self._integrator, state.cpg, inputs, dt, least)
 
 

@@ -1,22 +1,22 @@
 """Data of the paper's gait figures: oscillator series, phase portraits, footfall patterns.
 
-Pure data; drawing belongs to `viz`. The network runs in it without the lift-off
-gate, as the paper's does.
+Pure data; drawing belongs to `viz`. A single gait runs without the lift-off gate,
+as the paper's does; a transition runs with it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from bluefoot_mpc.gait.calibration import calibrate, mix
 from bluefoot_mpc.gait.config import GaitConfig
-from bluefoot_mpc.gait.couplings import coupling
 from bluefoot_mpc.gait.cpg import CpgInputs, CpgIntegrator, CpgState
 from bluefoot_mpc.gait.gait import Gait
+from bluefoot_mpc.gait.network import gated
 from bluefoot_mpc.gait.state import GaitInputs
-from bluefoot_mpc.gait.timing import cycle_time
+from bluefoot_mpc.gait.transition import Transition, place_of
 from bluefoot_mpc.settings import require_positive
 from bluefoot_mpc.types import BoolArray, FloatArray
 
@@ -61,86 +61,77 @@ class FootfallPattern:
     duty: FloatArray
 
 
-def cpg_series(
-    gait: str,
-    duration: float,
-    speed: float = 0.04,
-    dt: float = 0.005,
-    config: GaitConfig | None = None,
-    start: CpgState | None = None,
-) -> CpgSeries:
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Sampling:
+    """What to show, and of which gait."""
+
+    duration: float = 6.0  # s
+    dt: float = 0.005  # s between samples
+    speed: float = 0.04  # m/s, sets the cycle time
+    config: GaitConfig = field(default_factory=GaitConfig)
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        require_positive(duration=self.duration, dt=self.dt, speed=self.speed)
+
+
+def cpg_series(gait: str, sampling: Sampling | None = None, start: CpgState | None = None) -> CpgSeries:
     """Oscillators of one gait.
 
     Args:
         gait: name of the gait.
-        duration: s.
-        speed: m/s, sets the cycle time.
-        dt: s between samples.
-        config: gait configuration, or the default.
+        sampling: what to show.
         start: initial states; the gait's own limit cycle by default.
 
     Raises:
         UnknownNameError: there is no such gait.
     """
-    return _roll((gait, gait), duration, speed, dt, config or GaitConfig(), start, None)
+    return _roll((gait, gait), math.inf, sampling or Sampling(), start)
 
 
 def transition_series(
-    first: str,
-    second: str,
-    duration: float,
-    change_at: float,
-    speed: float = 0.04,
-    dt: float = 0.005,
-    config: GaitConfig | None = None,
+    first: str, second: str, change_at: float = 2.0, sampling: Sampling | None = None
 ) -> CpgSeries:
-    """Oscillators while one gait becomes another; arguments as `cpg_series`.
+    """Oscillators while one gait becomes another.
 
     Args:
         first: gait at the start.
         second: gait at the end.
-        duration: s.
         change_at: s, when the change is asked for; it takes ``config.blend_time``.
-        speed: m/s.
-        dt: s between samples.
-        config: gait configuration, or the default.
+        sampling: what to show.
+
+    Raises:
+        UnknownNameError: there is no such gait.
     """
-    return _roll((first, second), duration, speed, dt, config or GaitConfig(), None, change_at)
+    return _roll((first, second), change_at, sampling or Sampling(duration=12.0), None)
 
 
-def footfall_pattern(
-    gait: str,
-    stance_feet: FloatArray,
-    speed: float = 0.04,
-    duration: float = 6.0,
-    dt: float = 0.01,
-    config: GaitConfig | None = None,
-) -> FootfallPattern:
+def footfall_pattern(gait: str, stance_feet: FloatArray, sampling: Sampling | None = None) -> FootfallPattern:
     """Footfall pattern of the whole gait at a steady speed.
 
     Args:
         gait: name of the gait.
         stance_feet: (4, 3) m, nominal feet in b'.
-        speed: m/s.
-        duration: s shown, after the ramp has ended.
-        dt: s between samples.
-        config: gait configuration, or the default.
+        sampling: what to show, after the ramp has ended.
+
+    Raises:
+        UnknownNameError: there is no such gait.
     """
-    require_positive(speed=speed, duration=duration, dt=dt)
-    config = config or GaitConfig()
+    sampling = sampling or Sampling(dt=0.01)
+    config, dt = sampling.config, sampling.dt
     walker = Gait(config, stance_feet)
-    inputs = GaitInputs(velocity=np.array([speed, 0.0]), gait=gait)
-    settle = speed / config.max_acceleration + config.timing(gait).cycle_max
+    inputs = GaitInputs(velocity=np.array([sampling.speed, 0.0]), gait=gait)
+    settle = sampling.speed / config.max_acceleration + 1.5
     for _ in range(round(settle / dt)):
         output = walker.step(inputs, dt)
-    count = round(duration / dt)
+    count = round(sampling.duration / dt)
     stance = np.empty((count, 4), dtype=np.bool_)
     for k in range(count):
         output = walker.step(inputs, dt)
         stance[k] = ~output.phase.swing
     return FootfallPattern(
         gait=gait,
-        speed=speed,
+        speed=sampling.speed,
         time=np.arange(count) * np.float64(dt),
         stance=stance,
         cycle_time=output.cycle_time,
@@ -148,34 +139,24 @@ def footfall_pattern(
     )
 
 
-def _roll(
-    gaits: tuple[str, str],
-    duration: float,
-    speed: float,
-    dt: float,
-    config: GaitConfig,
-    start: CpgState | None,
-    change_at: float | None,
-) -> CpgSeries:
-    require_positive(duration=duration, dt=dt, speed=speed)
-    timings = [config.timing(coupling(name).name) for name in gaits]
-    cycles = [
-        calibrate(coupling(name), timing.coupling_gain, timing.swing_share, config.cpg)
-        for name, timing in zip(gaits, timings, strict=True)
-    ]
-    periods = [cycle_time(speed, 0.0, timing) for timing in timings]
-    integrator = CpgIntegrator(config.cpg)
-    state = start or cycles[0].start
-    count = round(duration / dt)
-    time = np.arange(count) * np.float64(dt)
-    begin = np.inf if change_at is None else change_at
-    blend = np.clip((time - begin) / config.blend_time, 0.0, 1.0)
+def _roll(gaits: tuple[str, str], change_at: float, sampling: Sampling, start: CpgState | None) -> CpgSeries:
+    way = Transition(sampling.config)
+    first, second = place_of(gaits[0]), place_of(gaits[1])
+    integrator = CpgIntegrator(sampling.config.cpg)
+    state = start or way.cycle(first).start
+    count = round(sampling.duration / sampling.dt)
+    time = np.arange(count) * np.float64(sampling.dt)
+    blend = np.clip((time - change_at) / sampling.config.blend_time, 0.0, 1.0)
     y1, y2 = np.empty((count, 4)), np.empty((count, 4))
     for k, share in enumerate(blend.tolist()):
         y1[k], y2[k] = state.y1, state.y2
-        rhythm = mix([c.rhythm for c in cycles], (1.0 - share, share))
-        period = (1.0 - share) * periods[0] + share * periods[1]
-        inputs = CpgInputs(omega=rhythm.turn / period, alpha=rhythm.alpha, matrix=rhythm.matrix)
-        state = integrator.advance(state, inputs, dt)
-    name = gaits[0] if change_at is None else f"{gaits[0]} to {gaits[1]}"
+        place = first + share * (second - first)
+        rhythm = way.rhythm(place)
+        omega = rhythm.turn / way.cycle_time(place, sampling.speed, 0.0)
+        inputs = CpgInputs(omega=omega, alpha=rhythm.alpha, matrix=rhythm.matrix)
+        if gaits[0] == gaits[1]:
+            state = integrator.advance(state, inputs, sampling.dt)
+        else:
+            state = gated(integrator, state, inputs, sampling.dt, way.least_stance(place))
+    name = gaits[0] if gaits[0] == gaits[1] else f"{gaits[0]} to {gaits[1]}"
     return CpgSeries(gait=name, time=time, y1=y1, y2=y2, blend=blend)

@@ -10,11 +10,11 @@ import numpy as np
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.gait.calibration import LimitCycle
 from bluefoot_mpc.gait.config import GaitConfig
-from bluefoot_mpc.gait.couplings import coupling
-from bluefoot_mpc.gait.engine import NAMES, GaitEngine
+from bluefoot_mpc.gait.engine import GaitEngine
 from bluefoot_mpc.gait.footholds import Stride, early_contact, freeze, virtual_foothold
 from bluefoot_mpc.gait.reflex import IDLE, ReflexOutput, reflex
 from bluefoot_mpc.gait.state import GaitInputs, GaitOutput, GaitState
+from bluefoot_mpc.gait.transition import place_of
 from bluefoot_mpc.types import BoolArray, ContactSchedule, FloatArray, GaitPhase
 
 __all__ = ["Gait", "GaitConfig", "GaitInputs", "GaitOutput"]
@@ -52,7 +52,7 @@ class Gait:
         Raises:
             UnknownNameError: there is no such gait.
         """
-        return self._engine.cycles[NAMES.index(coupling(gait).name)]
+        return self._engine.transition.cycle(place_of(gait))
 
     def step(self, inputs: GaitInputs, dt: float) -> GaitOutput:
         """Advance by one tick.
@@ -123,7 +123,7 @@ class Gait:
                     foot.goal, foot.goal_z = goal, place[2]
 
     def _accept(self, state: GaitState, inputs: GaitInputs) -> None:
-        state.target = NAMES.index(coupling(inputs.gait).name)
+        state.target = place_of(inputs.gait)
         if inputs.halt:
             state.wanted = state.velocity = 0j
             state.wanted_yaw_rate = state.yaw_rate = 0.0

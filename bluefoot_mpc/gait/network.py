@@ -16,26 +16,36 @@ NO_COUPLING = (0.0,) * 16
 def gated(
     integrator: CpgIntegrator, state: CpgState, inputs: CpgInputs, dt: float, least_stance: int
 ) -> CpgState:
-    """Advance, but hold back legs whose lift-off would leave too few feet standing.
+    """Advance, but hold back legs that must not lift yet.
+
+    With two feet to stand on, only a diagonal pair may fly. With three, one leg
+    flies, and a hind leg waits for the front leg diagonal to it, which comes
+    first in a walk.
 
     Args:
         integrator: workspace.
         state: states now.
         inputs: what drives the network.
         dt: s.
-        least_stance: fewest oscillators that must stay in stance.
+        least_stance: fewest oscillators that must stay in stance, 2 or 3.
     """
     after = integrator.advance(state, inputs, dt)
-    flying = sum(value > 0.0 for value in after.y2)
-    if flying <= 4 - least_stance:
-        return after
-    held = [True] * 4
-    room = 4 - least_stance - sum(a > 0.0 and b > 0.0 for a, b in zip(state.y2, after.y2, strict=True))
-    risers = [leg for leg in range(4) if state.y2[leg] <= 0.0 < after.y2[leg]]
-    risers.sort(key=lambda leg: -after.y2[leg])
-    for leg in risers[max(0, room) :]:
-        held[leg] = False
-    return merge(after, state, held)
+    flying = [leg for leg in range(4) if state.y2[leg] > 0.0 and after.y2[leg] > 0.0]
+    use = [True] * 4
+    for leg in range(4):  # front legs first
+        if state.y2[leg] <= 0.0 < after.y2[leg]:
+            use[leg] = _may_lift(leg, flying, after, least_stance)
+            if use[leg]:
+                flying.append(leg)
+    return after if all(use) else merge(after, state, use)
+
+
+def _may_lift(leg: int, flying: list[int], state: CpgState, least_stance: int) -> bool:
+    diagonal = 3 - leg
+    if least_stance >= 3:
+        waits = leg >= 2 and state.y1[diagonal] < 0.0
+        return not flying and not waits
+    return not flying or flying == [diagonal]
 
 
 def coming_to_rest(integrator: CpgIntegrator, state: CpgState, inputs: CpgInputs, dt: float) -> CpgState:

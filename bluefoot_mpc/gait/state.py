@@ -76,8 +76,8 @@ class GaitState:
         cpg: oscillators.
         pose: virtual robot.
         feet: one record a leg.
-        weights: shares of the named gaits, one-hot unless one blends into another.
-        target: index of the wanted gait.
+        place: place between the gaits, 0 trot, 1 walk.
+        target: place of the wanted gait.
         wanted: commanded velocity, m/s in b'.
         wanted_yaw_rate: rad/s.
         velocity: the same after the ramp, m/s.
@@ -94,8 +94,8 @@ class GaitState:
     rhythm: Rhythm
     pose: VirtualPose
     feet: list[Foot]
-    weights: tuple[float, ...]
-    target: int
+    place: float = 0.0
+    target: float = 0.0
     wanted: complex = 0j
     wanted_yaw_rate: float = 0.0
     velocity: complex = 0j
