@@ -21,6 +21,7 @@ from bluefoot_mpc.viz.style import (
     WARNING,
 )
 
+_NOTHING = np.full(1, np.nan)
 _COLUMNS = 700  # of the heat strip
 _STRIP_COLOURS = [[0.0, "rgba(18,131,210,0.05)"], [0.35, "#8cc3ec"], [0.65, "#eda83a"], [1.0, "#b3273c"]]
 """Calm below a third of the limit, warm above two thirds; ever darker, so that grey prints keep the order."""
@@ -103,10 +104,8 @@ def temperatures(series: RunSeries, warn_at: float) -> Panel:
             width=1.2,
         )
         traces.append({**line, "showlegend": False, "hovertemplate": "%{y:.1f} °C"})
-    traces += [
-        {**curve(series.time[:0], series.voltage[:0], leg, LEG_COLOURS[leg]), "showlegend": True}
-        for leg in LEGS
-    ]
+    # One line without points per leg, for the legend.
+    traces += [{**curve(_NOTHING, _NOTHING, leg, LEG_COLOURS[leg]), "showlegend": True} for leg in LEGS]
     titles = ["temperature (°C)", "voltage (V)"]
     traces.append({**curve(series.time, series.voltage, "voltage", ESTIMATE, axis="y2"), "showlegend": False})
     if np.isfinite(series.power).any():
@@ -165,7 +164,7 @@ def tick_times(series: RunSeries, period: float) -> Panel:
         "annotations": [
             {
                 "x": float(np.log10(value)),
-                "y": 1.0 - 0.09 * (index % 3),
+                "y": 0.96 - 0.09 * (index % 3),
                 "yref": "paper",
                 "text": text,
                 "showarrow": False,

@@ -195,7 +195,7 @@ def _footer(series: RunSeries, ticks: int) -> str:
     source = (
         "Curves named truth come from the simulator and were not known to the controller."
         if series.has_truth
-        else "This run has no simulator truth: everything is drawn from the robot's own measurements and estimates."
+        else "Without simulator truth, everything is drawn from the robot's measurements and estimates."
     )
     return f"{ticks} ticks. {source} Angles: roll right side down, pitch nose down, yaw left positive."
 

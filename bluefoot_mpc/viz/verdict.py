@@ -138,82 +138,70 @@ def tiles(summary: Mapping[str, Any], stall_torque: float, period: float) -> lis
         stall_torque: N·m.
         period: s, command period.
     """
-    tilt = attitude_goal(summary)
-    distance = summary.get("distance_m")
-    wanted = summary.get("speed_ref_mps")
-    walks = bool(wanted)
-    ticks = summary.get("tick_us") or {}
-    makers: list[Tile | None] = [
-        _tile("Distance", distance, 2, "m") if walks else None,
-        _speed_tile(summary) if walks else None,
-        _tile(
-            "Sideways drift",
-            summary.get("lateral_drift_m"),
-            0,
-            "mm",
-            scale=1e3,
-            goal="goal ≤ 10 % of distance",
-            holds=lambda x: abs(x) <= 0.1 * abs(distance or 0.0),
-        )
-        if walks
-        else None,
+    walks = bool(summary.get("speed_ref_mps"))
+    found = [
+        *(_way_tiles(summary) if walks else []),
+        *_attitude_tiles(summary),
+        *_balance_tiles(summary),
+        *_servo_tiles(summary, stall_torque),
+        *_timing_tiles(summary, period),
+    ]
+    return [tile for tile in found if tile is not None]
+
+
+def _way_tiles(summary: Mapping[str, Any]) -> list[Tile | None]:
+    distance, wanted = summary.get("distance_m"), float(summary["speed_ref_mps"])
+    speed = _Goal(f"commanded {number(wanted, 0, 1e3)} ± 10 %", lambda x: abs(x - wanted) <= 0.1 * wanted)
+    drift = _Goal("goal ≤ 10 % of distance", lambda x: abs(x) <= 0.1 * abs(distance or 0.0))
+    return [
+        _tile("Distance", distance, 2, "m"),
+        _tile("Speed", summary.get("speed_mps"), 1, "mm/s", speed, scale=1e3),
+        _tile("Sideways drift", summary.get("lateral_drift_m"), 0, "mm", drift, scale=1e3),
         _tile("Heading drift", summary.get("yaw_drift_deg"), 1, "°"),
-        _tile(
-            "Roll, RMS", summary.get("roll_rms_deg"), 2, "°", goal=f"goal ≤ {tilt:g}°", holds=lambda x: x <= tilt
-        ),
-        _tile(
-            "Pitch, RMS", summary.get("pitch_rms_deg"), 2, "°", goal=f"goal ≤ {tilt:g}°", holds=lambda x: x <= tilt
-        ),
-        _tile(
-            "Attitude error, RMS",
-            summary.get("attitude_error_rms_deg"),
-            2,
-            "°",
-            goal="of the estimate, goal ≤ 0.3°",
-            holds=lambda x: x <= 0.3,
-        ),
-        _tile(
-            "Swing clearance",
-            summary.get("swing_clearance_median_m"),
-            1,
-            "mm",
-            scale=1e3,
-            goal="median, goal ≥ 8 mm",
-            holds=lambda x: x >= 0.008,
-        ),
+    ]
+
+
+def _attitude_tiles(summary: Mapping[str, Any]) -> list[Tile | None]:
+    limit = attitude_goal(summary)
+    level = _Goal(f"goal ≤ {limit:g}°", lambda x: x <= limit)
+    estimate = _Goal("of the estimate, goal ≤ 0.3°", lambda x: x <= 0.3)
+    return [
+        _tile("Roll, RMS", summary.get("roll_rms_deg"), 2, "°", level),
+        _tile("Pitch, RMS", summary.get("pitch_rms_deg"), 2, "°", level),
+        _tile("Attitude error, RMS", summary.get("attitude_error_rms_deg"), 2, "°", estimate),
+    ]
+
+
+def _balance_tiles(summary: Mapping[str, Any]) -> list[Tile | None]:
+    clearance = _Goal("median, goal ≥ 8 mm", lambda x: x >= 0.008)
+    return [
+        _tile("Swing clearance", summary.get("swing_clearance_median_m"), 1, "mm", clearance, scale=1e3),
         _tile("ZMP inside support", summary.get("zmp_inside_fraction"), 0, "%", scale=100.0),
         _tile("ZMP margin, least", summary.get("zmp_margin_min_m"), 0, "mm", scale=1e3),
-        _tile(
-            "Torque, peak",
-            summary.get("torque_peak_nm"),
-            2,
-            "N·m",
-            goal=f"stall {stall_torque:g} N·m",
-            holds=lambda x: x <= stall_torque,
-        ),
+    ]
+
+
+def _servo_tiles(summary: Mapping[str, Any], stall_torque: float) -> list[Tile | None]:
+    below_stall = _Goal(f"stall {stall_torque:g} N·m", lambda x: x <= 1.001 * stall_torque)
+    cool = _Goal("switches off at 70 °C", lambda x: x < 65.0)
+    return [
+        _tile("Torque, peak", summary.get("torque_peak_nm"), 2, "N·m", below_stall),
         _tile("Torque, RMS", summary.get("torque_rms_nm"), 2, "N·m"),
-        _tile(
-            "Hottest servo",
-            summary.get("servo_temp_max_c"),
-            0,
-            "°C",
-            goal="limit 70 °C",
-            holds=lambda x: x < 65.0,
-        ),
+        _tile("Hottest servo", summary.get("servo_temp_max_c"), 0, "°C", cool),
         _tile("Energy", summary.get("energy_j"), 0, "J"),
         _tile("Cost of transport", summary.get("cost_of_transport"), 1),
-        _tile(
-            "Tick, 99 %",
-            ticks.get("p99"),
-            0,
-            "µs",
-            goal=f"deadline {1e3 * period:g} ms",
-            holds=lambda x: x < 1e6 * period,
-        ),
-        _tile("Deadline misses", summary.get("deadline_misses"), 0, holds=lambda x: x == 0),
-        _tile("QP failures", summary.get("qp_failures"), 0, holds=lambda x: x == 0),
     ]
-    return [tile for tile in makers if tile is not None]
+
+
+def _timing_tiles(summary: Mapping[str, Any], period: float) -> list[Tile | None]:
+    ticks = summary.get("tick_us") or {}
+    in_time = _Goal(f"deadline {1e3 * period:g} ms", lambda x: x < 1e6 * period)
+    none = _Goal("goal 0", lambda x: x == 0)
+    return [
+        _tile("Tick, 99 %", ticks.get("p99"), 0, "µs", in_time),
+        _tile("Deadline misses", summary.get("deadline_misses"), 0, "", none),
+        _tile("QP failures", summary.get("qp_failures"), 0, "", none),
+    ]
 
 
 def attitude_goal(summary: Mapping[str, Any]) -> float:
@@ -235,33 +223,24 @@ def number(value: Any, digits: int, scale: float = 1.0) -> str:
     return text.replace("-", _MINUS)
 
 
-def _speed_tile(summary: Mapping[str, Any]) -> Tile | None:
-    wanted = float(summary["speed_ref_mps"])
-    return _tile(
-        "Speed",
-        summary.get("speed_mps"),
-        1,
-        "mm/s",
-        scale=1e3,
-        goal=f"commanded {number(wanted, 0, 1e3)} ± 10 %",
-        holds=lambda x: abs(x - wanted) <= 0.1 * wanted,
-    )
+@dataclass(frozen=True, slots=True)
+class _Goal:
+    """What a figure should be: in words, and as a test in the summary's unit."""
+
+    note: str
+    holds: Callable[[float], bool]
 
 
 def _tile(
-    label: str,
-    value: Any,
-    digits: int,
-    unit: str = "",
-    *,
-    scale: float = 1.0,
-    goal: str = "",
-    holds: Callable[[float], bool] | None = None,
+    label: str, value: Any, digits: int, unit: str = "", goal: _Goal | None = None, *, scale: float = 1.0
 ) -> Tile | None:
     if value is None:
         return None
-    status = "" if holds is None else "good" if holds(float(value)) else "bad"
-    return Tile(label=label, value=number(value, digits, scale), unit=unit, note=goal, status=status)
+    text = number(value, digits, scale)
+    if goal is None:
+        return Tile(label=label, value=text, unit=unit)
+    status = "good" if goal.holds(float(value)) else "bad"
+    return Tile(label=label, value=text, unit=unit, note=goal.note, status=status)
 
 
 def _extent(summary: Mapping[str, Any]) -> str:
