@@ -128,16 +128,22 @@ class Terminal:
     def until(self, words, limit=60.0):
         end = time.monotonic() + limit
         while words not in self.seen and time.monotonic() < end:
-            if select.select([self.master], [], [], 0.1)[0]:
-                self.seen += os.read(self.master, 65536)
+            self.look()
         assert words in self.seen, self.seen.decode(errors="replace")
+
+    def look(self):
+        if select.select([self.master], [], [], 0.1)[0]:
+            self.seen += os.read(self.master, 65536)
 
     def type(self, keys):
         os.write(self.master, keys)
 
     def end(self):
         """(exit status, what --json printed), after the process has ended by itself."""
-        out, _ = self.process.communicate(timeout=60.0)
+        while self.process.poll() is None:
+            self.look()
+        out = self.process.stdout.read()
+        self.process.stdout.close()
         assert termios.tcgetattr(self.slave) == self.before
         os.close(self.slave)
         os.close(self.master)

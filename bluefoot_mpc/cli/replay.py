@@ -1,0 +1,66 @@
+"""``bluefoot replay``: look at a recorded run again, or think it through again."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+from bluefoot_mpc.cli.arguments import ReplayCommand
+from bluefoot_mpc.cli.outcome import FAILED, OK, Outcome
+from bluefoot_mpc.runtime.log import RunLog, read_log
+from bluefoot_mpc.runtime.replay import RethinkReport, Step, rethink
+from bluefoot_mpc.scenarios import pipeline_from_log
+from bluefoot_mpc.types import JointCommand, MotionCommand, SafetyRequest, SensorFrame
+
+
+def replay(command: ReplayCommand) -> Outcome:
+    """Describe a log, and show or rethink it as asked."""
+    log = read_log(command.log)
+    data: dict[str, Any] = describe(log)
+    lines = [_sentence(data)]
+    status = OK
+    if command.rethink:
+        report = rethink(log, lambda: _todays_controller(log))
+        status = OK if report.equal else FAILED
+        data["rethink"] = _as_data(report)
+        lines.append(str(report))
+    return Outcome(status=status, data=data, page=tuple(lines))
+
+
+def describe(log: RunLog) -> dict[str, Any]:
+    """What a log holds, in a few figures."""
+    run = log.config.get("run", {})
+    duration = log.frames[-1].time - log.frames[0].time if log.frames else 0.0
+    return {
+        "log": log.path,
+        "scenario": run.get("scenario"),
+        "seed": run.get("seed"),
+        "controller": run.get("controller"),
+        "duration_s": duration,
+        "frames": len(log.frames),
+        "truncated": log.truncated,
+        "stop_reason": log.stop_reason,
+        "versions": log.versions,
+    }
+
+
+def _sentence(data: dict[str, Any]) -> str:
+    cut = ", cut off: what is readable" if data["truncated"] else ""
+    return (
+        f"{data['log']}: {data['scenario'] or 'a run'}, seed {data['seed']}, {data['duration_s']:.2f} s "
+        f"in {data['frames']} frames{cut} ({data['stop_reason']})"
+    )
+
+
+def _todays_controller(log: RunLog) -> Step:
+    pipeline = pipeline_from_log(log)
+
+    def step(frame: SensorFrame, motion: MotionCommand, safety: SafetyRequest) -> JointCommand:
+        return pipeline.step(frame, motion, safety).command
+
+    return step
+
+
+def _as_data(report: RethinkReport) -> dict[str, Any]:
+    return {**dataclasses.asdict(report), "equal": report.equal}
