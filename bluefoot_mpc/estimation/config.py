@@ -16,6 +16,7 @@ class ImuConfig:
     gyro_bias: float = 0.0115  # rad/s, deviation of a uniform ±0.02
     gyro_drift: float = 1.3e-4  # rad/s per root second: 0.001 in a minute
     accel_noise: float = 0.2  # m/s², white; twice the data sheet's for the shaking of footfalls
+    shake: float = 1.0  # share of the force's spread within a frame that counts as noise
     accel_bias: float = 0.0173  # m/s², deviation of a uniform ±0.03
     accel_drift: float = 1e-4  # m/s² per root second
     lost_after: float = 0.1  # s without a usable sample until the estimate is not healthy
@@ -29,7 +30,7 @@ class ImuConfig:
             accel_bias=self.accel_bias, lost_after=self.lost_after, lost_rate=self.lost_rate,
             lost_accel=self.lost_accel,
         )  # fmt: skip
-        require_nonnegative(gyro_drift=self.gyro_drift, accel_drift=self.accel_drift)
+        require_nonnegative(shake=self.shake, gyro_drift=self.gyro_drift, accel_drift=self.accel_drift)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -74,6 +75,7 @@ class HeadingConfig:
     enabled: bool = True
     noise: float = 0.02  # of the field, deviation of one sample
     hard_iron: float = 0.0173  # of the field, deviation of a uniform ±3 %
+    interval: float = 0.1  # s between corrections
     reference_samples: int = 25  # averaged for the starting heading
     min_horizontal: float = 0.15  # of the field; less gives no heading
     gate: float = 0.2  # of the reference, change of the horizontal strength beyond which a sample is skipped
@@ -81,7 +83,7 @@ class HeadingConfig:
     def __post_init__(self) -> None:
         require_positive(
             noise=self.noise, hard_iron=self.hard_iron, reference_samples=self.reference_samples,
-            min_horizontal=self.min_horizontal, gate=self.gate,
+            min_horizontal=self.min_horizontal, gate=self.gate, interval=self.interval,
         )  # fmt: skip
 
 

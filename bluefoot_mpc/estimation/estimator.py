@@ -9,14 +9,9 @@ import numpy as np
 
 from bluefoot_mpc.estimation.config import EstimatorConfig
 from bluefoot_mpc.estimation.contacts import SwitchState, advance_switches, initial_switches
-from bluefoot_mpc.estimation.filter import (
-    FilterState,
-    frame_noise,
-    initial_state,
-    plant_feet,
-    predict,
-)
-from bluefoot_mpc.estimation.heading import HeadingReference, advance_heading, newest_field
+from bluefoot_mpc.estimation.corrections import plant_feet
+from bluefoot_mpc.estimation.filter import FilterState, frame_noise, initial_state, predict
+from bluefoot_mpc.estimation.heading import HeadingReference, advance_heading
 from bluefoot_mpc.estimation.inertial import (
     ZERO,
     Motion,
@@ -41,7 +36,6 @@ from bluefoot_mpc.estimation.odometry import (
 )
 from bluefoot_mpc.estimation.rest import RestState, advance_rest, at_rest, correct_bias
 from bluefoot_mpc.estimation.stance import (
-    FootMeasurement,
     StanceState,
     advance_stance,
     measure_feet,
@@ -132,9 +126,11 @@ class Estimator:
         state, motion, roll = self._predict(memory, angles, samples, (memory.time, frame.time))
         points = feet_in_base(self._geometry, angles)
         state, stance, rest = self._correct(
-            memory, state, frame, (joints, switches), samples, (angles, points)
+            memory, state, frame, (joints, switches), samples, legs=(angles, points)
         )
-        state, heading = self._use_magnetometer(state, memory.heading, frame)
+        heading = memory.heading
+        if self._config.heading.enabled:
+            state, heading = advance_heading(state, heading, frame.imu, dt, self._config.heading)
         odometry = advance_position(memory.odometry, state.feet, roll, stance.used, motion.displacement)
         rate = memory.rate
         if samples:
@@ -192,19 +188,19 @@ class Estimator:
         """Carry the filter to the frame's time; also gives the way that rolling feet made."""
         before = memory.filter
         motion = integrate(
-            before.quaternion, before.velocity, samples, memory.sample, span,
-            (before.gyro_bias, before.accel_bias),
+            before.quaternion, before.velocity, samples, before=memory.sample, span=span,
+            biases=(before.gyro_bias, before.accel_bias),
         )  # fmt: skip
         bend = (angles - memory.angles).reshape(N_LEGS, -1)[:, 1:].sum(axis=1).tolist()
         direction = [a + q for a, q in zip(self._azimuth, angles[::4].tolist(), strict=True)]
         rotation = rotation_matrix(motion.quaternion)
         roll = rolling(self._geometry.foot_radius, rotation, np.array(motion.turn), direction, bend)
-        noise = frame_noise(len(samples), self._config.imu)
-        return predict(before, motion, roll, noise, span[1] - span[0], self._config), motion, roll
+        noise = frame_noise(samples, self._config.imu)
+        return predict(before, motion, roll, noise, dt=span[1] - span[0], config=self._config), motion, roll
 
     def _correct(
         self, memory: _Memory, state: FilterState, frame: SensorFrame,
-        sensed: tuple[JointState, SwitchState], samples: list[Sample],
+        sensed: tuple[JointState, SwitchState], samples: list[Sample], *,
         legs: tuple[FloatArray, FloatArray],
     ) -> tuple[FilterState, StanceState, RestState]:  # fmt: skip
         """Use standing feet, and the gyro's rest."""
@@ -217,21 +213,11 @@ class Estimator:
         )
         closed = frame.contact & frame.contact_valid & switches.contact
         standing: list[bool] = (closed & known_legs(joints, config.joint)).tolist()
-        state, stance = advance_stance(state, memory.stance, feet, standing, dt, config.contact)
+        state, stance = advance_stance(state, memory.stance, feet, standing, dt=dt, config=config.contact)
         rest = advance_rest(memory.rest, angles, dt, config.rest)
         if at_rest(rest, standing, samples, state, config.rest):
             state = correct_bias(state, samples, config.rest)
         return state, stance, rest
-
-    def _use_magnetometer(
-        self, state: FilterState, reference: HeadingReference, frame: SensorFrame
-    ) -> tuple[FilterState, HeadingReference]:
-        if not self._config.heading.enabled:
-            return state, reference
-        field = newest_field(frame.imu.magnetometer, frame.imu.valid.tolist())
-        if field is None:
-            return state, reference
-        return advance_heading(state, reference, field, self._config.heading)
 
     def _finish(self, memory: _Memory, points: FloatArray) -> BodyState:
         """Keep the memory and make the public record from it."""

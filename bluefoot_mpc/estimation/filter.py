@@ -22,10 +22,9 @@ from bluefoot_mpc.estimation.config import EstimatorConfig, ImuConfig
 from bluefoot_mpc.estimation.inertial import (
     Motion,
     Quaternion,
+    Sample,
     Vector,
-    quaternion_product,
     rotation_matrix,
-    small_quaternion,
 )
 from bluefoot_mpc.model.parameters import GRAVITY
 from bluefoot_mpc.types import N_LEGS, FloatArray
@@ -78,18 +77,37 @@ class Noise(NamedTuple):
 
     Attributes:
         rate: rad²/s², of the frame's mean angular velocity.
-        force: m²/s⁴, of its mean specific force.
+        force: m²/s⁴, of its mean specific force along the trunk's x or y, and z.
     """
 
     rate: float
-    force: float
+    force: tuple[float, float]
 
 
-def frame_noise(samples: int, config: ImuConfig) -> Noise:
-    """Variance of the mean of so many samples, or of not knowing without any."""
-    if samples == 0:
-        return Noise(config.lost_rate**2, config.lost_accel**2)
-    return Noise(config.gyro_noise**2 / samples, config.accel_noise**2 / samples)
+def frame_noise(samples: list[Sample], config: ImuConfig) -> Noise:
+    """Variance of the means of a frame's samples, or of not knowing without any.
+
+    The spread of the specific force within the frame counts as its noise:
+    footfalls shake the trunk faster than the samples can follow, and what falls
+    between them is missing from the mean.
+
+    Args:
+        samples: of the frame.
+        config: noise figures.
+    """
+    n = len(samples)
+    if n == 0:
+        return Noise(config.lost_rate**2, (config.lost_accel**2, config.lost_accel**2))
+    least = config.accel_noise**2
+    x, y, z = (_spread([s.force[axis] for s in samples]) for axis in range(3))
+    shake = config.shake / n
+    return Noise(config.gyro_noise**2 / n, (least / n + shake * 0.5 * (x + y), least / n + shake * z))
+
+
+def _spread(values: list[float]) -> float:
+    """Mean square deviation from the mean."""
+    mean = sum(values) / len(values)
+    return sum([(value - mean) ** 2 for value in values]) / len(values)
 
 
 def initial_state(quaternion: Quaternion, tilt: float, config: EstimatorConfig) -> FilterState:
@@ -150,8 +168,9 @@ _VELOCITY_DIAGONAL = np.tile(VELOCITY, N_LEGS)
 
 
 def predict(
-    state: FilterState, motion: Motion, roll: FloatArray, noise: Noise, dt: float, config: EstimatorConfig
-) -> FilterState:
+    state: FilterState, motion: Motion, roll: FloatArray, noise: Noise, *, dt: float,
+    config: EstimatorConfig,
+) -> FilterState:  # fmt: skip
     """Carry estimate and covariance over one frame.
 
     Args:
@@ -176,90 +195,9 @@ def predict(
 
 def _diagonal_noise(noise: Noise, dt: float, config: EstimatorConfig) -> FloatArray:
     diagonal = np.zeros(SIZE)
-    diagonal[3:6] = noise.force * dt * dt
+    diagonal[3:5] = noise.force[0] * dt * dt
+    diagonal[5] = noise.force[1] * dt * dt
     diagonal[6:18] = config.contact.slip**2 * dt
     diagonal[18:21] = config.imu.gyro_drift**2 * dt
     diagonal[21:24] = config.imu.accel_drift**2 * dt
     return diagonal
-
-
-def correct(state: FilterState, index: IndexArray, residual: FloatArray, noise: FloatArray) -> FilterState:
-    """Use direct measurements of some components of the error.
-
-    Args:
-        state: before.
-        index: (m,) components measured.
-        residual: (m,) measured minus estimated.
-        noise: (m, m) covariance of the measurement.
-    """
-    covariance = state.covariance
-    rows = covariance[index]
-    gain = np.linalg.solve(rows[:, index] + noise, rows)
-    reduced = covariance - rows.T @ gain
-    return shifted(state, residual @ gain, 0.5 * (reduced + reduced.T))
-
-
-def correct_scalar(state: FilterState, row: FloatArray, residual: float, variance: float) -> FilterState:
-    """Use one measurement of the combination ``row @ error`` (26,), with `residual` = estimated minus measured."""
-    spread = state.covariance @ row
-    scale = 1.0 / (float(row @ spread) + variance)
-    reduced = state.covariance - np.outer(scale * spread, spread)
-    return shifted(state, (-residual * scale) * spread, reduced)
-
-
-def shifted(state: FilterState, change: FloatArray, covariance: FloatArray) -> FilterState:
-    """The state moved by a (26,) correction, with a new covariance."""
-    c: list[float] = change.tolist()
-    turn = small_quaternion(c[0], c[1], c[2])
-    matrix = rotation_matrix(turn)
-    moved = np.concatenate((np.array((state.velocity,)), state.feet)) @ matrix.T + change[3:18].reshape(5, 3)
-    velocity = moved[0].tolist()
-    (gx, gy, gz), (ax, ay, az), (hx, hy) = state.gyro_bias, state.accel_bias, state.hard_iron
-    return FilterState(
-        quaternion_product(turn, state.quaternion),
-        (velocity[0], velocity[1], velocity[2]),
-        moved[1:],
-        (gx + c[18], gy + c[19], gz + c[20]),
-        (ax + c[21], ay + c[22], az + c[23]),
-        (hx + c[24], hy + c[25]),
-        covariance,
-    )
-
-
-def plant_feet(state: FilterState, legs: list[int], feet: FloatArray, noise: FloatArray) -> FilterState:
-    """Forget some feet and take them up anew where the kinematics see them.
-
-    Args:
-        state: before.
-        legs: indices of the feet.
-        feet: (4, 3) m, measured, relative to the IMU, world axes.
-        noise: (4, 3, 3) m², its covariances.
-    """
-    if not legs:
-        return state
-    covariance = state.covariance.copy()
-    points = state.feet.copy()
-    for leg in legs:
-        rows = slice(6 + 3 * leg, 9 + 3 * leg)
-        covariance[rows, :] = 0.0
-        covariance[:, rows] = 0.0
-        covariance[rows, rows] = noise[leg]
-        points[leg] = feet[leg]
-    return state._replace(feet=points, covariance=covariance)
-
-
-def distances(state: FilterState, residual: FloatArray, noise: FloatArray) -> list[float]:
-    """Squared Mahalanobis distance of each foot's residual.
-
-    Args:
-        state: before the correction.
-        residual: (4, 3) m.
-        noise: (4, 3, 3) m².
-    """
-    blocks = state.covariance[_BLOCK_ROWS, _BLOCK_COLUMNS] + noise
-    solved = np.linalg.solve(blocks, residual[:, :, None])[:, :, 0]
-    return list((solved * residual).sum(axis=1).tolist())
-
-
-_BLOCK_ROWS = FEET.reshape(N_LEGS, 3, 1)
-_BLOCK_COLUMNS = FEET.reshape(N_LEGS, 1, 3)

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from bluefoot_mpc.estimation.config import HeadingConfig
-from bluefoot_mpc.estimation.filter import SIZE, FilterState, correct_scalar
+from bluefoot_mpc.estimation.corrections import correct_scalar
+from bluefoot_mpc.estimation.filter import SIZE, FilterState
 from bluefoot_mpc.estimation.inertial import rotated
-from bluefoot_mpc.types import FloatArray
+from bluefoot_mpc.types import FloatArray, ImuBatch
 
 YAW = 2
 HARD_IRON_X, HARD_IRON_Y = 24, 25
@@ -28,11 +29,13 @@ class HeadingReference(NamedTuple):
         x: of the field, sum, then mean, of its horizontal part in the world.
         y: the same.
         samples: how many were taken.
+        wait: s until the next sample is used; more often would cost time for nothing.
     """
 
     x: float = 0.0
     y: float = 0.0
     samples: int = 0
+    wait: float = 0.0
 
 
 def newest_field(samples: FloatArray, valid: list[bool]) -> tuple[float, float, float] | None:
@@ -45,31 +48,46 @@ def newest_field(samples: FloatArray, valid: list[bool]) -> tuple[float, float, 
 
 
 def advance_heading(
-    state: FilterState, reference: HeadingReference, field: tuple[float, float, float], config: HeadingConfig
+    state: FilterState, reference: HeadingReference, batch: ImuBatch, dt: float, config: HeadingConfig
 ) -> tuple[FilterState, HeadingReference]:
-    """Take one magnetometer sample, for the reference first, then for the yaw.
+    """Take the newest magnetometer sample, for the reference first, then for the yaw.
 
     Args:
         state: filter.
         reference: field at the start, as far as it is known.
-        field: over its nominal strength, base frame.
+        batch: samples of this frame, base frame.
+        dt: s since the previous frame.
         config: noise and gates.
     """
+    reference = reference._replace(wait=reference.wait - dt)
+    known = reference.samples >= config.reference_samples
+    if known and reference.wait > 0.0:
+        return state, reference
+    field = newest_field(batch.magnetometer, batch.valid.tolist())
+    if field is None:
+        return state, reference
     x, y, _ = rotated(state.quaternion, *field)
-    if reference.samples < config.reference_samples:
+    if not known:
         n = reference.samples
         return state, HeadingReference(
             (n * reference.x + x) / (n + 1), (n * reference.y + y) / (n + 1), n + 1
         )
+    return _correct_yaw(state, reference, x, y, config), reference._replace(wait=config.interval)
+
+
+def _correct_yaw(
+    state: FilterState, reference: HeadingReference, x: float, y: float, config: HeadingConfig
+) -> FilterState:
+    """Use a horizontal field (x, y) in the world, unless its strength is not the reference's."""
     strength = math.hypot(reference.x, reference.y)
     change = abs(math.hypot(x, y) - strength)
     if strength < config.min_horizontal or change > config.gate * strength + 2.0 * config.hard_iron:
-        return state, reference
+        return state
     ux, uy = reference.x / strength, reference.y / strength
     residual = math.atan2(ux * y - uy * x, ux * x + uy * y)
     row, iron = heading_row(state, (ux, uy), strength)
     variance = (config.noise / strength) ** 2
-    return correct_scalar(state, row, residual - iron, variance), reference
+    return correct_scalar(state, row, residual - iron, variance)
 
 
 def heading_row(

@@ -64,13 +64,13 @@ def usable_samples(batch: ImuBatch, after: float, until: float, last: Sample | N
         until: s, time of this frame.
         last: the newest sample used so far.
     """
-    rows: list[list[float]] = np.column_stack((batch.time, batch.gyro, batch.accel)).tolist()
+    columns = (batch.time.tolist(), batch.gyro.tolist(), batch.accel.tolist(), batch.valid.tolist())
     samples: list[Sample] = []
     newest = last
-    for row, valid in zip(rows, batch.valid.tolist(), strict=True):
-        if not valid or not math.isfinite(sum(row)) or not after < row[0] <= until + 1e-6:
+    for time, (wx, wy, wz), (ax, ay, az), valid in zip(*columns, strict=True):
+        if not valid or not math.isfinite(wx + wy + wz + ax + ay + az) or not after < time <= until + 1e-6:
             continue
-        sample = Sample(row[0], (row[1], row[2], row[3]), (row[4], row[5], row[6]))
+        sample = Sample(time, (wx, wy, wz), (ax, ay, az))
         if newest is None or sample.rate != newest.rate or sample.force != newest.force:
             samples.append(sample)
         newest = sample
@@ -78,7 +78,7 @@ def usable_samples(batch: ImuBatch, after: float, until: float, last: Sample | N
 
 
 def integrate(
-    quaternion: Quaternion, velocity: Vector, samples: list[Sample], before: Sample | None,
+    quaternion: Quaternion, velocity: Vector, samples: list[Sample], *, before: Sample | None,
     span: tuple[float, float], biases: tuple[Vector, Vector],
 ) -> Motion:  # fmt: skip
     """Carry attitude and velocity of the IMU over one frame.

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bluefoot_mpc.estimation.config import RestConfig
-from bluefoot_mpc.estimation.filter import GYRO_BIAS, FilterState, correct
+from bluefoot_mpc.estimation.corrections import correct
+from bluefoot_mpc.estimation.filter import GYRO_BIAS, FilterState
 from bluefoot_mpc.estimation.inertial import Sample, mean_rate
 from bluefoot_mpc.types import FloatArray
 

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bluefoot_mpc.estimation.config import ContactConfig
-from bluefoot_mpc.estimation.filter import FEET, VELOCITY, FilterState, correct, distances, plant_feet
+from bluefoot_mpc.estimation.corrections import correct, distances, forget_velocity, plant_feet
+from bluefoot_mpc.estimation.filter import FEET, VELOCITY, FilterState
 from bluefoot_mpc.estimation.inertial import rotation_matrix
 from bluefoot_mpc.types import N_LEGS, FloatArray
 
@@ -63,7 +64,7 @@ def measure_feet(
 
 
 def advance_stance(
-    state: FilterState, stance: StanceState, feet: FootMeasurement, standing: list[bool], dt: float,
+    state: FilterState, stance: StanceState, feet: FootMeasurement, standing: list[bool], *, dt: float,
     config: ContactConfig,
 ) -> tuple[FilterState, StanceState]:  # fmt: skip
     """Correct the filter by the feet that stand still; take all others up anew.
@@ -71,8 +72,9 @@ def advance_stance(
     A foot counts once it has stood still for the probation under a closed
     switch, and not in a frame where its motion does not fit the IMU's: it
     slips, is lifting before the switch has told, or the switch is stuck. After a
-    while without any such foot the robot is assumed near rest, weakly, so that
-    the estimate of velocity and tilt stays bounded.
+    while without any such foot, the velocity is taken up anew if feet stand; in
+    the air or on its belly the robot is assumed near rest, weakly, so that
+    velocity and tilt stay bounded.
 
     Args:
         state: filter, predicted to now.
@@ -96,8 +98,12 @@ def advance_stance(
         rows = _ROWS[sum(1 << leg for leg in used)]
         state = correct(state, rows, residual[legs].reshape(-1), noise)
     elif blind > config.blind_after:
-        velocity = np.array(state.velocity)
-        state = correct(state, VELOCITY, -velocity, config.blind_speed**2 * np.eye(3))
+        if any(standing):
+            # Feet stand, yet none fits: it is the velocity that is wrong.
+            state, blind = forget_velocity(state, config.blind_speed), 0.0
+        else:
+            velocity = np.array(state.velocity)
+            state = correct(state, VELOCITY, -velocity, config.blind_speed**2 * np.eye(3))
     others = [leg for leg in range(N_LEGS) if leg not in used]
     if others:
         points = feet.points @ rotation_matrix(state.quaternion).T
