@@ -32,7 +32,6 @@ PAPER_TILT_DEG = 37.0
 """Degrees of roll or pitch with the ankle direction free, as the paper states it."""
 
 _FEASIBLE = -1e-9  # rad, rounding of a joint exactly at its limit
-_RAYS = 240  # around the stance, the four axis directions among them
 _STEPS = 41  # along each ray, before the edge is bisected
 _BISECTIONS = 14  # leaves 0.2 µm or 0.0001° of a step
 
@@ -44,12 +43,15 @@ class RomConfig:
     shift: float = 0.13  # m, half width of the x-y map
     tilt_deg: float = 50.0  # degrees, half width of the roll-pitch map
     points: int = 81  # a side of each map, odd so that the stance itself is one
+    rays: int = 240  # around the stance for the outlines, the four axis directions among them
     ankle_direction_deg: float | None = None  # degrees; None takes the robot's stance
 
     def __post_init__(self) -> None:
-        require_positive(shift=self.shift, tilt_deg=self.tilt_deg, points=self.points)
+        require_positive(shift=self.shift, tilt_deg=self.tilt_deg, points=self.points, rays=self.rays)
         if self.points % 2 == 0:
             raise ConfigurationError(f"points = {self.points} must be odd")
+        if self.rays % 4 != 0:
+            raise ConfigurationError(f"rays = {self.rays} must be a multiple of 4")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -63,8 +65,8 @@ class RomMap:
         second: (n,) second coordinate: y, or pitch.
         margin: (n, n) rad, by [first, second]: least distance of any joint to
             its imposed limit, negative where one is passed, -inf out of reach.
-        boundary: (240, 2) last feasible pose along rays from the stance, the first
-            along + of the first coordinate, then counter-clockwise in 1.5° steps.
+        boundary: (rays, 2) last feasible pose along even rays from the stance, the first
+            along + of the first coordinate, then counter-clockwise.
     """
 
     kind: Kind
@@ -151,7 +153,7 @@ def study_range_of_motion(parameters: RobotParameters, config: RomConfig | None 
         half = config.shift if kind == "shift" else float(np.radians(config.tilt_deg))
         axis = np.linspace(-half, half, config.points)
         margin = _margin_of(geometry, parameters.stance, kind, direction if ankle == "fixed" else None)
-        return _map(kind, ankle, axis, margin)
+        return _map(kind, ankle, axis, config.rays, margin)
 
     return RomStudy(
         robot=parameters.name,
@@ -208,12 +210,12 @@ def _margin_of(
     return margin
 
 
-def _map(kind: Kind, ankle: Ankle, axis: FloatArray, margin: Margin) -> RomMap:
+def _map(kind: Kind, ankle: Ankle, axis: FloatArray, rays: int, margin: Margin) -> RomMap:
     first, second = np.meshgrid(axis, axis, indexing="ij")
     values = margin(np.column_stack([first.ravel(), second.ravel()])).reshape(first.shape)
-    angles = np.linspace(0.0, 2.0 * np.pi, _RAYS, endpoint=False)
-    rays = np.column_stack([np.cos(angles), np.sin(angles)])
-    boundary = _reach_along(margin, rays, float(axis[-1]))[:, None] * rays
+    angles = np.linspace(0.0, 2.0 * np.pi, rays, endpoint=False)
+    units = np.column_stack([np.cos(angles), np.sin(angles)])
+    boundary = _reach_along(margin, units, float(axis[-1]))[:, None] * units
     return RomMap(kind=kind, ankle=ankle, first=axis, second=axis, margin=values, boundary=boundary)
 
 
