@@ -63,7 +63,7 @@ def decode(cls: type[T], data: bytes) -> T:
         LogError: the data are not such a record.
     """
     try:
-        return typing.cast(T, _plan(cls).from_table(orjson.loads(data)))
+        return typing.cast(T, _plan(cls).from_table(_require(dict, orjson.loads(data))))
     except (TypeError, ValueError, KeyError, AttributeError) as error:
         reason = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
         raise LogError(f"not a record of type {cls.__name__}: {reason}") from error
