@@ -26,9 +26,10 @@ SHUTDOWN_TEMPERATURE = 70.0
 
 def to_counts(servo: ServoParameters, angle: FloatArray) -> FloatArray:
     """Angles (rad) as whole position counts, zero at the servo's centre, inside its range."""
-    counts = np.floor(angle / servo.step_angle + 0.5)
+    counts = np.floor(angle * (1.0 / servo.step_angle) + 0.5)
     half = servo.steps // 2
-    return np.asarray(np.clip(counts, -half, half - 1), dtype=np.float64)
+    # Two ufuncs: np.clip takes three times as long on a few numbers.
+    return np.asarray(np.minimum(np.maximum(counts, -half), half - 1))
 
 
 def to_angle(servo: ServoParameters, counts: FloatArray) -> FloatArray:

@@ -11,8 +11,9 @@ import numpy as np
 from bluefoot_mpc.exceptions import DeviceError
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.sim.config import SimConfig
+from bluefoot_mpc.sim.inertial import sensor_motion, window_means
 from bluefoot_mpc.sim.randomization import draw
-from bluefoot_mpc.sim.sensors import FootSwitches, Imu, ServoSensors
+from bluefoot_mpc.sim.sensors import FootSwitches, Imu, ServoSensors, all_valid
 from bluefoot_mpc.sim.servo import BankConfig, Plant, ServoBank
 from bluefoot_mpc.sim.terrain import Ground
 from bluefoot_mpc.sim.truth import TruthReader
@@ -120,11 +121,8 @@ class SimRobot:
         Raises:
             DeviceError: the physics became unstable.
         """
-        if (
-            np.isfinite(command.position).all()
-            and np.isfinite(command.speed).all()
-            and np.isfinite(command.torque_limit).all()
-        ):
+        q, speed, limit = command.position, command.speed, command.torque_limit
+        if math.isfinite(q @ q + speed @ speed + limit @ limit):
             self._commands.append((self._step + self._latency, command))
             self._next_event = min(self._next_event, self._step + self._latency)
         else:
@@ -182,9 +180,9 @@ class SimRobot:
             raise DeviceError(f"the simulation became unstable before t = {now:.3f} s")
         count = len(times)
         samples = self._samples[:count].copy()
-        duty, power, voltage = self._bank.finish_frame(self._steps)
-        self._truth.power = power
-        position, speed, load = self._reports.measure(self._bank.plant.position, duty, self._steps * dt)
+        bank = self._bank
+        self._truth.power, voltage = bank.finish_frame(self._steps)
+        position, speed, load = self._reports.measure(bank.plant.position, bank.duty, self._steps * dt)
         force = np.sqrt(np.square(samples[:, 9:].reshape(count, N_LEGS, 3)).sum(axis=2))
         contact, contact_time = self._switches.measure(times, force, now)
         return SensorFrame(
@@ -192,29 +190,33 @@ class SimRobot:
             joint_position=position,
             joint_speed=speed,
             joint_load=load,
-            joint_temperature=np.rint(self._bank.temperature),
+            joint_temperature=np.rint(bank.temperature),
             joint_time=np.full(N_JOINTS, now),
-            joint_valid=np.ones(N_JOINTS, dtype=np.bool_),
+            joint_valid=all_valid(N_JOINTS),
             voltage=round(voltage, 1),
             voltage_valid=True,
             imu=self._imu.measure(np.array(times), samples[:, :9]),
             contact=contact,
             contact_time=np.full(N_LEGS, contact_time),
-            contact_valid=np.ones(N_LEGS, dtype=np.bool_),
+            contact_valid=all_valid(N_LEGS),
         )
 
     def _advance(self) -> list[float]:
         """The physics steps of one frame.
 
-        Sensors are evaluated in the steps that end on the IMU's period, so their
-        samples are one physics step old.
+        Gyro and accelerometer give means over the IMU's period. The other
+        sensors are evaluated in the steps that end on it, so their samples are
+        one physics step old.
 
         Returns:
             Times of the samples in the first rows of the sample buffer, s.
         """
         model, data, world = self._world.model, self._world.data, self._world
         option, advance, mj_step = model.opt, self._bank.advance, mujoco.mj_step
-        sensed = data.sensordata[world.sensor : world.sensor + 21]
+        sensed = data.sensordata[world.sensor : world.sensor + 15]
+        pose, twist = data.qpos[world.q : world.q + 7], data.qvel[world.v : world.v + 6]
+        mount, window = self._robot.parameters.sensors.imu, self._imu_steps * self.config.physics_period
+        before = sensor_motion(pose.tolist(), twist.tolist(), mount)
         flags = option.disableflags & ~_SENSORS_OFF
         times: list[float] = []
         option.disableflags = flags | _SENSORS_OFF
@@ -229,9 +231,13 @@ class SimRobot:
             option.disableflags = flags
             mj_step(model, data)
             option.disableflags = flags | _SENSORS_OFF
-            self._samples[len(times)] = sensed
+            after = sensor_motion(pose.tolist(), twist.tolist(), mount)
+            row = self._samples[len(times)]
+            row[:6] = window_means(before, after, window)
+            row[6:] = sensed
+            before = after
             self._truth.look_for_contacts()
-            times.append(step * self.config.physics_period)
+            times.append((step + 1) * self.config.physics_period)
         self._step += self._steps
         return times
 

@@ -6,6 +6,7 @@ others' errors as they were. Error sizes are assumptions: see `SensorConfig`.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import deque
 
@@ -19,6 +20,14 @@ from bluefoot_mpc.types import N_JOINTS, N_LEGS, BoolArray, FloatArray, ImuBatch
 
 _MINUTE = 60.0
 _BITS = np.array([1, 2, 4, 8])
+
+
+@functools.cache
+def all_valid(count: int) -> BoolArray:
+    """(count,) True, shared and read-only."""
+    valid = np.ones(count, dtype=np.bool_)
+    valid.flags.writeable = False
+    return valid
 
 
 class Imu:
@@ -50,19 +59,30 @@ class Imu:
         """
         config, count = self._config, len(time)
         noise = self._gyro.standard_normal((count + 1, 3))
-        gyro = truth[:, 0:3] + (self.gyro_bias + config.gyro_noise * noise[:count])
+        gyro = config.gyro_noise * noise[:count]
+        gyro += self.gyro_bias
+        gyro += truth[:, 0:3]
         span = count * config.imu_period
-        self.gyro_bias = self.gyro_bias + config.gyro_drift * math.sqrt(span / _MINUTE) * noise[count]
-        accel = config.accel_noise * self._accel.standard_normal((count, 3))
-        accel += truth[:, 3:6] + self.accel_bias
-        field = np.full((count, 3), np.nan)
-        for row in range(-self._samples % config.magnetometer_divider, count, config.magnetometer_divider):
-            noise_row = config.magnetometer_noise * self._magnetometer.standard_normal(3)
-            field[row] = truth[row, 6:9] + self.magnetometer_bias + noise_row
-        self._samples += count
-        return ImuBatch(
-            time=time, gyro=gyro, accel=accel, magnetometer=field, valid=np.ones(count, dtype=np.bool_)
+        self.gyro_bias = self.gyro_bias + (config.gyro_drift * math.sqrt(span / _MINUTE)) * noise[count]
+        accel = self._accel.standard_normal((count, 3))
+        accel *= config.accel_noise
+        accel += self.accel_bias
+        accel += truth[:, 3:6]
+        batch = ImuBatch(
+            time=time, gyro=gyro, accel=accel, magnetometer=self._field(truth), valid=all_valid(count)
         )
+        self._samples += count
+        return batch
+
+    def _field(self, truth: FloatArray) -> FloatArray:
+        config, count = self._config, len(truth)
+        field = np.empty((count, 3))
+        field.fill(math.nan)
+        for row in range(-self._samples % config.magnetometer_divider, count, config.magnetometer_divider):
+            noise = self._magnetometer.standard_normal(3)
+            noise *= config.magnetometer_noise
+            field[row] = truth[row, 6:9] + self.magnetometer_bias + noise
+        return field
 
 
 class FootSwitches:
@@ -135,7 +155,7 @@ class ServoSensors:
 
         Args:
             position: (16,) rad, true joint angles now.
-            duty: (16,) mean duty since the last frame.
+            duty: (16,) duty now: all that the servo knows of its load.
             period: s since the last frame.
 
         Returns:

@@ -20,6 +20,9 @@ from bluefoot_mpc.model import servo as law
 from bluefoot_mpc.model.parameters import BatteryParameters, ServoParameters
 from bluefoot_mpc.types import JOINTS, N_JOINTS, BoolArray, FloatArray, JointCommand
 
+_NO_RAMP = 1e6
+"""Counts a step: a goal ramp that never holds back."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class BankConfig:
@@ -61,39 +64,44 @@ class ServoBank:
     Attributes:
         advance: one physics step: reads the joints, writes drive torque and
             friction. A bare callable, so that the hot loop pays for nothing else.
+        goal: (16,) counts, goal registers.
+        profile: (16,) counts, where the moving-speed ramp has come to.
+        play: (16,) rad, where the pinions lie between the gears' flanks.
         duty: (16,) fraction of the supply voltage on each motor.
         torque: (16,) N·m, motor torque after back-EMF, before friction.
+        voltage: (1,) V at the servos.
         temperature: (16,) °C.
-        shut_down: (16,) True where a servo switched off by heat.
-        average: means over the last frame, see `finish_frame`.
     """
 
     def __init__(self, config: BankConfig, plant: Plant) -> None:
         self.config = config
         self.plant = plant
         self.goal = np.zeros(N_JOINTS)
-        self.speed_limit = np.zeros(N_JOINTS)
-        self.torque_limit = np.zeros(N_JOINTS)
         self.profile = np.zeros(N_JOINTS)
         self.play = np.zeros(N_JOINTS)
         self.duty = np.zeros(N_JOINTS)
         self.torque = np.zeros(N_JOINTS)
         self.voltage = np.zeros(1)
-        self.sums = np.zeros(2 * N_JOINTS + 2)
         self.temperature = np.zeros(N_JOINTS)
-        self.shut_down: BoolArray = np.zeros(N_JOINTS, dtype=np.bool_)
+        self._ramp = np.zeros(N_JOINTS)
+        self._limit = np.zeros(N_JOINTS)
+        self._live = np.zeros(N_JOINTS)
         self._wanted_limit = np.zeros(N_JOINTS)
+        self._shut_down: BoolArray = np.zeros(N_JOINTS, dtype=np.bool_)
+        self._sums = np.zeros(N_JOINTS + 2)
+        # Winding loss of a motor torque, W/(N·m)².
+        self._loss = law.winding_resistance(config.servo) * law.current_per_torque(config.servo) ** 2
         self._function = servo_function(config)
         self._buffer, self.advance = self._connect()
         self.reset()
 
     def reset(self) -> None:
         """Cold servos, torque off, pack at rest."""
-        for state in (self.goal, self.speed_limit, self.torque_limit, self.profile, self.play):
+        for state in (self.goal, self.profile, self.play, self.duty, self.torque, self._wanted_limit):
             state[:] = 0.0
-        for state in (self.duty, self.torque, self.sums, self._wanted_limit):
-            state[:] = 0.0
-        self.shut_down[:] = False
+        self._ramp[:] = _NO_RAMP
+        self._live[:] = 0.0
+        self._shut_down[:] = False
         self.cool()
         self._apply_limits()
 
@@ -101,7 +109,7 @@ class ServoBank:
         """Servos at ambient temperature and an unloaded pack, everything else as it is."""
         self.temperature[:] = self.config.servo.ambient
         self.voltage[:] = self.config.open_voltage
-        self.sums[:] = 0.0
+        self._sums[:] = 0.0
 
     def hold(self, position: FloatArray) -> None:
         """Hold `position` (16, rad) with full torque, at once."""
@@ -112,47 +120,62 @@ class ServoBank:
         """Take goal, moving speed and torque limit as the registers would hold them."""
         servo = self.config.servo
         self.goal[:] = law.to_counts(servo, command.position)
-        self.speed_limit[:] = law.quantise_speed_limit(command.speed) / servo.step_angle
-        limit = np.clip(command.torque_limit, 0.0, 1.0)
-        self._wanted_limit[:] = np.floor(limit * law.FULL_DUTY) / law.FULL_DUTY
-        # A shut-down servo works again only when it has cooled and its limit is written anew.
-        self.shut_down &= self.temperature >= law.SHUTDOWN_TEMPERATURE
-        self._apply_limits()
+        if command.speed.any():
+            ramp = law.quantise_speed_limit(command.speed) * (self.config.period / servo.step_angle)
+            self._ramp[:] = np.where(ramp > 0.0, ramp, _NO_RAMP)
+        else:
+            self._ramp[:] = _NO_RAMP
+        limit = np.minimum(np.maximum(command.torque_limit, 0.0), 1.0)
+        np.floor(limit * law.FULL_DUTY, out=limit)
+        limit /= law.FULL_DUTY
+        if self._shut_down.any():
+            # A servo works again only when it has cooled and its limit is written anew.
+            self._shut_down &= self.temperature >= law.SHUTDOWN_TEMPERATURE
+            self._wanted_limit[:] = limit
+            self._apply_limits()
+        elif not np.array_equal(limit, self._wanted_limit):
+            self._wanted_limit[:] = limit
+            self._apply_limits()
 
     @property
     def overheated(self) -> tuple[str, ...]:
         """Names of the servos that switched off by heat."""
-        return tuple(name for name, off in zip(JOINTS, self.shut_down, strict=True) if off)
+        return tuple(name for name, off in zip(JOINTS, self._shut_down, strict=True) if off)
 
-    def finish_frame(self, steps: int) -> tuple[FloatArray, float, float]:
+    def finish_frame(self, steps: int) -> tuple[float, float]:
         """Close a frame of `steps` physics steps: heat the motors, clear the sums.
 
         Returns:
-            (16,) mean duty, mean electrical power in W, mean voltage in V.
+            Mean electrical power in W, mean voltage in V.
         """
-        servo, mean = self.config.servo, self.sums / steps
-        loss = law.winding_resistance(servo) * mean[:N_JOINTS]
-        self.temperature[:] = law.heat(servo, self.temperature, loss, steps * self.config.period)
+        mean = self._sums / steps
+        loss = self._loss * mean[:N_JOINTS]
+        self.temperature[:] = law.heat(self.config.servo, self.temperature, loss, steps * self.config.period)
         if self.temperature.max() >= law.SHUTDOWN_TEMPERATURE:
-            self.shut_down |= self.temperature >= law.SHUTDOWN_TEMPERATURE
+            self._shut_down |= self.temperature >= law.SHUTDOWN_TEMPERATURE
             self._apply_limits()
-        self.sums[:] = 0.0
-        return mean[N_JOINTS : 2 * N_JOINTS], float(mean[-2]), float(mean[-1])
+        self._sums[:] = 0.0
+        return float(mean[N_JOINTS]), float(mean[N_JOINTS + 1])
 
     def _apply_limits(self) -> None:
+        """Bring torque limits into force, and with them which servos are live or limp."""
         servo = self.config.servo
-        self.torque_limit[:] = np.where(self.shut_down, 0.0, self._wanted_limit)
+        self._limit[:] = np.where(self._shut_down, 0.0, self._wanted_limit)
+        live = self._limit > 0.0
+        # A servo that is switched on starts its ramp from where it stands.
+        woken = live & (self._live == 0.0)
+        self.profile[woken] = law.to_counts(servo, self.plant.position)[woken]
+        self._live[:] = live
         # An open bridge carries no current, so a limp servo does not brake.
-        brake = np.where(self.torque_limit > 0.0, servo.back_emf, 0.0)
-        self.plant.damping[:] = brake + servo.viscous_friction
+        self.plant.damping[:] = servo.back_emf * self._live + servo.viscous_friction
 
     def _connect(self) -> tuple[Any, Callable[[], None]]:
         """Bind the function to memory. States are updated in place: see `servo_function`."""
         buffer: Any
         buffer, run = self._function.buffer()
         plant = self.plant
-        states = (self.profile, self.play, self.voltage, self.sums)
-        inputs = (plant.position, plant.speed, self.goal, self.speed_limit, self.torque_limit, *states)
+        states = (self.profile, self.play, self.voltage, self._sums)
+        inputs = (plant.position, plant.speed, self.goal, self._ramp, self._limit, self._live, *states)
         for index, array in enumerate(inputs):
             buffer.set_arg(index, array.data)
         for index, array in enumerate((plant.drive, plant.friction, self.duty, self.torque, *states)):
@@ -163,56 +186,52 @@ class ServoBank:
 def servo_function(config: BankConfig) -> ca.Function:
     """One physics step of all servos, in counts, N·m and V.
 
-    Inputs: position, speed, goal, speed limit (counts/s, 0 = none), torque
-    limit, and the states profile, play, voltage, sums. Outputs: drive, friction,
+    Inputs: position, speed, goal, ramp (counts a step), torque limit, live (0 or
+    1), and the states profile, play, voltage, sums. Outputs: drive, friction,
     duty, torque, and the states anew. Every entry of a state depends on its own
     old value, so it is read before it is written and may be updated in place.
+    The sums are those of squared torque (16), power and voltage.
     """
     servo, n = config.servo, N_JOINTS
-    q, qd, goal, speed, limit, profile, play = (
-        ca.SX.sym(name, n) for name in ("q", "qd", "goal", "speed", "limit", "profile", "play")
+    q, qd, goal, ramp, limit, live, profile, play = (
+        ca.SX.sym(name, n) for name in ("q", "qd", "goal", "ramp", "limit", "live", "profile", "play")
     )
-    voltage, sums = ca.SX.sym("voltage"), ca.SX.sym("sums", 2 * n + 2)
-    present = ca.floor(q / servo.step_angle + 0.5)
-    next_profile = _follow(profile, goal, speed * config.period)
-    next_profile = ca.if_else(limit > 0.0, next_profile, present)
+    voltage, sums = ca.SX.sym("voltage"), ca.SX.sym("sums", n + 2)
+    present = ca.floor(q * (1.0 / servo.step_angle) + 0.5)
+    next_profile = ca.fmin(ca.fmax(goal, profile - ramp), profile + ramp)
     duty = _duty(servo, next_profile - present, ca.DM(config.gain), limit)
 
     share = voltage / servo.nominal_voltage
-    drive = servo.stall_torque * share * duty
-    torque = ca.if_else(limit > 0.0, drive - servo.back_emf * qd, 0.0)
+    drive = (servo.stall_torque * share) * duty
+    back_emf = servo.back_emf * qd
+    torque = live * (drive - back_emf)
     next_play = play
     if config.backlash > 0.0:
         next_play, engaged = _backlash(config, play, share * duty, qd)
         # Between the flanks nothing is passed on: what joint damping takes is given back.
         torque = engaged * torque
-        drive = torque + ca.if_else(limit > 0.0, servo.back_emf * qd, 0.0)
-    fading = 1.0 / (1.0 + (qd / config.load_friction_speed) ** 2)
-    friction = servo.coulomb_friction + servo.load_friction * fading * ca.fabs(torque)
+        drive = torque + live * back_emf
+    fading = 1.0 / (1.0 + (qd * (1.0 / config.load_friction_speed)) ** 2)
+    friction = servo.coulomb_friction + servo.load_friction * (fading * ca.fabs(torque))
     friction = ca.DM(config.friction_scale) * friction
 
-    current = law.current_per_torque(servo) * torque
-    supply = ca.sum1(ca.fmax(duty * current, 0.0)) + n * config.standby_current
+    # The bridge draws duty times the winding's current, and gives nothing back.
+    drawn = law.current_per_torque(servo) * ca.sum1(ca.fmax(duty * torque, 0.0))
+    supply = drawn + n * config.standby_current
     next_voltage = config.open_voltage - config.battery.resistance * supply
-    next_sums = sums + ca.vertcat(current**2, duty, voltage * supply, voltage)
+    next_sums = sums + ca.vertcat(torque**2, voltage * supply, voltage)
     return ca.Function(
         "servos",
-        [q, qd, goal, speed, limit, profile, play, voltage, sums],
+        [q, qd, goal, ramp, limit, live, profile, play, voltage, sums],
         [drive, friction, duty, torque, next_profile, next_play, next_voltage, next_sums],
     )
-
-
-def _follow(profile: ca.SX, goal: ca.SX, step: ca.SX) -> ca.SX:
-    """The goal ramp of the moving-speed limit; a step of zero means no limit."""
-    ramp = profile + ca.fmin(ca.fmax(goal - profile, -step), step)
-    return ca.if_else(step > 0.0, ramp, goal)
 
 
 def _duty(servo: ServoParameters, error: ca.SX, gain: ca.DM, limit: ca.SX) -> ca.SX:
     """Symbolic twin of `bluefoot_mpc.model.servo.duty`, with a factor on the slope."""
     beyond = ca.fabs(error) - servo.compliance_margin
-    ramp = servo.punch / law.FULL_DUTY + gain * beyond / servo.compliance_slope
-    return ca.if_else(beyond > 0.0, ca.sign(error) * ca.fmin(ramp, limit), 0.0)
+    ramp = servo.punch / law.FULL_DUTY + (gain / servo.compliance_slope) * beyond
+    return (beyond > 0.0) * ca.sign(error) * ca.fmin(ramp, limit)
 
 
 def _backlash(config: BankConfig, play: ca.SX, drive: ca.SX, qd: ca.SX) -> tuple[ca.SX, ca.SX]:

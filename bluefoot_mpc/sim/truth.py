@@ -66,7 +66,7 @@ class TruthReader:
             ),
             foot_position=feet,
             foot_height=self._ground.clearance(feet, self._radius),
-            foot_force=-data.sensordata[world.sensor + 9 : world.sensor + 21].reshape(N_LEGS, 3),
+            foot_force=-data.sensordata[world.sensor + 3 : world.sensor + 15].reshape(N_LEGS, 3),
             motor_torque=bank.torque.copy(),
             duty=bank.duty.copy(),
             motor_temperature=bank.temperature.copy(),

@@ -41,8 +41,8 @@ class World:
         foot_geoms: (4,) geoms of the foot balls.
         body_of_part: for every geom, the name of its body where it is a part of
             the robot other than a foot, else "".
-        sensor: first entry of the robot's sensors: gyro, accelerometer,
-            magnetometer (3 each), then the force of the ground on each foot (4 x 3).
+        sensor: first entry of the robot's sensors: magnetometer (3), then the
+            force of the ground on each foot (4 x 3).
     """
 
     model: mujoco.MjModel
@@ -161,12 +161,9 @@ def _add_servos(spec: mujoco.MjSpec, parameters: RobotParameters) -> None:
 def _add_sensors(spec: mujoco.MjSpec, parameters: RobotParameters, config: SensorConfig) -> None:
     spec.body("trunk").add_site(name="imu", pos=list(parameters.sensors.imu))
     kinds = mujoco.mjtSensor
-    for name, kind in (
-        ("gyro", kinds.mjSENS_GYRO),
-        ("accel", kinds.mjSENS_ACCELEROMETER),
-        ("magnetometer", kinds.mjSENS_MAGNETOMETER),
-    ):
-        spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="imu")
+    spec.add_sensor(
+        name="magnetometer", type=kinds.mjSENS_MAGNETOMETER, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="imu"
+    )
     for leg in LEGS:
         spec.add_sensor(
             name=f"{leg}_force",
@@ -204,5 +201,5 @@ def _locate(model: mujoco.MjModel, data: mujoco.MjData) -> World:
         ctrl=int(model.actuator(JOINTS[0]).id),
         foot_geoms=feet,
         body_of_part=tuple(parts),
-        sensor=int(model.sensor("gyro").adr[0]),
+        sensor=int(model.sensor("magnetometer").adr[0]),
     )

@@ -94,6 +94,17 @@ def test_moving_speed_limits_the_speed():
     assert (angle[800] - angle[300]) / 0.5 == pytest.approx(1.0, rel=0.02)
 
 
+def test_waking_servo_starts_its_ramp_where_it_stands():
+    bench = Bench()
+    bench.command(0.0, limit=0.0)
+    bench.data.qpos[:] = -0.5
+    bench.run(0.01)
+    bench.command(0.5, speed=0.5)
+    angle = bench.run(0.3)[:, 0]
+    assert np.diff(angle).max() < 0.0012
+    assert angle[-1] == pytest.approx(-0.5 + 0.5 * 0.3, abs=0.03)
+
+
 def test_back_emf_brakes_a_live_servo_and_not_a_limp_one():
     live, limp = Bench(parameters(**NO_FRICTION)), Bench(parameters(**NO_FRICTION))
     live.command(0.0)
@@ -113,7 +124,7 @@ def test_voltage_sags_with_the_current():
     voltage = float(bench.bank.voltage[0])
     current = 16 * (1.5 * voltage / 12.0 + 0.05)
     assert voltage == pytest.approx(12.0 - 0.06 * current, abs=1e-6)
-    _, power, mean_voltage = bench.bank.finish_frame(50)
+    power, mean_voltage = bench.bank.finish_frame(50)
     assert power == pytest.approx(voltage * current, rel=0.05)
     assert mean_voltage == pytest.approx(voltage, abs=0.05)
 
@@ -125,7 +136,7 @@ def test_stalled_servo_heats_up_switches_off_and_comes_back():
     while not bench.bank.overheated:
         bench.run(0.001)
         # One millisecond stands for a second: the law is exact for constant loss.
-        bench.bank.sums[:] *= 1000.0
+        bench.bank._sums[:] *= 1000.0
         bench.bank.finish_frame(1000)
         elapsed += 1.0
     # 18 W through 8 K/W heads for 169 °C; 70 °C is passed on the way.
@@ -170,14 +181,14 @@ def test_states_updated_in_place_equal_those_of_the_function():
         bench.command(
             rng.normal(0.0, 0.3, 16), speed=float(rng.integers(0, 3)), limit=float(rng.integers(0, 2))
         )
-        before = [bank.profile.copy(), bank.play.copy(), bank.voltage.copy(), bank.sums.copy()]
+        before = [bank.profile.copy(), bank.play.copy(), bank.voltage.copy(), bank._sums.copy()]
         expected = bank._function(
-            bench.data.qpos, bench.data.qvel, bank.goal, bank.speed_limit, bank.torque_limit, *before
+            bench.data.qpos, bench.data.qvel, bank.goal, bank._ramp, bank._limit, bank._live, *before
         )
         bank.advance()
         found = (bench.data.ctrl, bench.model.dof_frictionloss, bank.duty, bank.torque)
         for want, got in zip(
-            expected, (*found, bank.profile, bank.play, bank.voltage, bank.sums), strict=True
+            expected, (*found, bank.profile, bank.play, bank.voltage, bank._sums), strict=True
         ):
             assert np.array_equal(np.asarray(want).ravel(), got)
 
