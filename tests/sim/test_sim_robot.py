@@ -104,7 +104,7 @@ def test_contact_forces_carry_the_weight_and_feet_give_little(model):
 def test_first_frame_has_the_samples_of_standing(model):
     frame = SimRobot(model, SimConfig()).reset()
     assert frame.time == 0.0
-    assert frame.imu.time == pytest.approx([-0.016, -0.011, -0.006, -0.001])
+    assert frame.imu.time == pytest.approx([-0.015, -0.010, -0.005, 0.0])
     assert frame.contact.all()
 
 
