@@ -9,66 +9,97 @@ at 100 mm/s). Means come exactly from the change of velocity and orientation.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any
+
+import casadi as ca
+import numpy as np
 
 from bluefoot_mpc.model.parameters import GRAVITY
+from bluefoot_mpc.types import FloatArray
 
-Vector = tuple[float, float, float]
-
-
-class Motion(NamedTuple):
-    """Orientation of the base (w, x, y, z) and velocity of the sensor at one instant, world axes."""
-
-    quaternion: tuple[float, float, float, float]
-    velocity: Vector  # m/s
+_STATE = 13
 
 
-def sensor_motion(pose: list[float], twist: list[float], mount: Vector) -> Motion:
-    """State of a sensor from MuJoCo's free joint.
+class InertialWindows:
+    """Means of angular velocity and specific force over successive windows.
 
-    Args:
-        pose: 7 entries of qpos: position, quaternion w, x, y, z.
-        twist: 6 entries of qvel: linear velocity in world, angular velocity in base.
-        mount: sensor in the base frame, m.
+    All windows of a frame are one call of a CasADi function, 2 µs; the window
+    that a frame leaves open goes on in the next.
     """
-    w, x, y, z = pose[3:7]
-    p, q, r = twist[3:6]
-    a, b, c = mount
-    lever = (q * c - r * b, r * a - p * c, p * b - q * a)
-    turned = _rotate((w, x, y, z), lever)
-    return Motion((w, x, y, z), (twist[0] + turned[0], twist[1] + turned[1], twist[2] + turned[2]))
+
+    def __init__(self, mount: tuple[float, float, float], period: float, count: int) -> None:
+        """Make room for `count` windows of `period` seconds for a sensor at `mount` (m, base frame)."""
+        self._states = np.zeros((count + 1, _STATE))
+        self._states[:, 3] = 1.0
+        self._means = np.zeros((count, 6))
+        self._function = window_function(mount, period, count)
+        buffer: Any
+        buffer, self._run = self._function.buffer()
+        buffer.set_arg(0, self._states.data)
+        buffer.set_res(0, self._means.data)
+        self._buffer = buffer
+
+    def begin(self, pose: FloatArray, twist: FloatArray) -> None:
+        """Open the first window of a frame at a state: see `mark`."""
+        self.mark(-1, pose, twist)
+
+    def mark(self, window: int, pose: FloatArray, twist: FloatArray) -> None:
+        """Close a window and open the next.
+
+        Args:
+            window: number of the window in this frame, from 0.
+            pose: (7,) MuJoCo's free joint: position in world, quaternion w, x, y, z.
+            twist: (6,) linear velocity in world, angular velocity in base.
+        """
+        state = self._states[window + 1]
+        state[:7] = pose
+        state[7:] = twist
+
+    def means(self, count: int) -> FloatArray:
+        """(count, 6) mean angular velocity (rad/s) and specific force (m/s²), base frame.
+
+        The last closed window's end is where the next frame begins.
+        """
+        self._run()
+        self._states[0] = self._states[count]
+        return self._means[:count].copy()
 
 
-def window_means(before: Motion, after: Motion, dt: float) -> tuple[float, float, float, float, float, float]:
-    """Mean angular velocity (rad/s) and specific force (m/s²) over a window, base frame.
+def window_function(mount: tuple[float, float, float], period: float, count: int) -> ca.Function:
+    """Means over `count` windows from the 13 x (count + 1) states between them.
 
-    Args:
-        before: state at the window's start.
-        after: state at its end.
-        dt: length of the window, s; short against the motion, so that the
-            frame of the result is the window's middle.
+    Windows must be short against the motion: the frame of a mean is the base
+    in the middle of its window.
     """
-    w, x, y, z = before.quaternion
-    s, u, v, t = after.quaternion
-    # conj(before) * after is the turn during the window.
-    scale = 2.0 / dt if w * s + x * u + y * v + z * t >= 0.0 else -2.0 / dt
-    rate = (
-        scale * (w * u - x * s - y * t + z * v),
-        scale * (w * v + x * t - y * s - z * u),
-        scale * (w * t - x * v + y * u - z * s),
-    )
-    if scale < 0.0:
-        s, u, v, t = -s, -u, -v, -t
-    size = ((w + s) ** 2 + (x + u) ** 2 + (y + v) ** 2 + (z + t) ** 2) ** 0.5
-    middle_conjugate = ((w + s) / size, -(x + u) / size, -(y + v) / size, -(z + t) / size)
-    change = tuple((b - a) / dt for a, b in zip(before.velocity, after.velocity, strict=True))
-    force = _rotate(middle_conjugate, (change[0], change[1], change[2] + GRAVITY))
-    return (*rate, *force)
+    states = ca.SX.sym("states", _STATE, count + 1)
+    lever = ca.DM(list(mount))
+    quaternions = [states[3:7, k] for k in range(count + 1)]
+    velocities = [
+        states[7:10, k] + _rotate(quaternions[k], ca.cross(states[10:13, k], lever)) for k in range(count + 1)
+    ]
+    gravity = ca.DM([0.0, 0.0, GRAVITY])
+    columns = []
+    for k in range(count):
+        before, after = quaternions[k], quaternions[k + 1]
+        # Both signs are the same orientation: take the one next to `before`.
+        after = ca.if_else(ca.dot(before, after) >= 0.0, after, -after)
+        middle = before + after
+        middle = middle / ca.norm_2(middle)
+        rate = (2.0 / period) * _product(_conjugate(before), after)[1:4]
+        force = _rotate(_conjugate(middle), (velocities[k + 1] - velocities[k]) / period + gravity)
+        columns.append(ca.vertcat(rate, force))
+    return ca.Function("windows", [states], [ca.horzcat(*columns)])
 
 
-def _rotate(quaternion: tuple[float, float, float, float], vector: Vector) -> Vector:
-    w, x, y, z = quaternion
-    a, b, c = vector
-    # v + 2 w (q x v) + 2 q x (q x v)
-    i, j, k = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-    return (a + w * i + y * k - z * j, b + w * j + z * i - x * k, c + w * k + x * j - y * i)
+def _conjugate(quaternion: ca.SX) -> ca.SX:
+    return ca.vertcat(quaternion[0], -quaternion[1:4])
+
+
+def _product(a: ca.SX, b: ca.SX) -> ca.SX:
+    vector = a[0] * b[1:4] + b[0] * a[1:4] + ca.cross(a[1:4], b[1:4])
+    return ca.vertcat(a[0] * b[0] - ca.dot(a[1:4], b[1:4]), vector)
+
+
+def _rotate(quaternion: ca.SX, vector: ca.SX) -> ca.SX:
+    turned = 2.0 * ca.cross(quaternion[1:4], vector)
+    return vector + quaternion[0] * turned + ca.cross(quaternion[1:4], turned)

@@ -11,7 +11,7 @@ import numpy as np
 from bluefoot_mpc.exceptions import DeviceError
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.sim.config import SimConfig
-from bluefoot_mpc.sim.inertial import sensor_motion, window_means
+from bluefoot_mpc.sim.inertial import InertialWindows
 from bluefoot_mpc.sim.randomization import draw
 from bluefoot_mpc.sim.sensors import FootSwitches, Imu, ServoSensors, all_valid
 from bluefoot_mpc.sim.servo import BankConfig, Plant, ServoBank
@@ -65,7 +65,9 @@ class SimRobot:
         self._reports = ServoSensors(config.sensors, robot.parameters.servo, seed)
         self._ground = Ground(config.world, self._world.model, self._world.data)
         self._truth = TruthReader(self._world, self._ground, robot.parameters.legs.foot_radius)
-        self._samples = np.zeros((self._steps // self._imu_steps + 1, 21))
+        windows = self._steps // self._imu_steps + 1
+        self._inertial = InertialWindows(robot.parameters.sensors.imu, config.sensors.imu_period, windows)
+        self._sensed = np.zeros((windows, 15))
         self._commands: deque[tuple[int, JointCommand]] = deque()
         self._pushes: list[tuple[int, int, FloatArray]] = []
         self._frame = self.reset()
@@ -103,6 +105,8 @@ class SimRobot:
         # Standing still is simulated before time zero, the last command period with sensors.
         settle = max(1, math.ceil(self.config.settle_time / self.config.command_period)) * self._steps
         self._step = -settle
+        data, q, v = self._world.data, self._world.q, self._world.v
+        self._inertial.begin(data.qpos[q : q + 7], data.qvel[v : v + 6])
         self._next_event = _NEVER
         while self._step < 0:
             self._bank.cool()
@@ -179,11 +183,11 @@ class SimRobot:
         if not math.isfinite(self._world.data.qpos[self._world.q + 2]):
             raise DeviceError(f"the simulation became unstable before t = {now:.3f} s")
         count = len(times)
-        samples = self._samples[:count].copy()
+        sensed = self._sensed[:count]
         bank = self._bank
         self._truth.power, voltage = bank.finish_frame(self._steps)
         position, speed, load = self._reports.measure(bank.plant.position, bank.duty, self._steps * dt)
-        force = np.sqrt(np.square(samples[:, 9:].reshape(count, N_LEGS, 3)).sum(axis=2))
+        force = np.sqrt(np.square(sensed[:, 3:].reshape(count, N_LEGS, 3)).sum(axis=2))
         contact, contact_time = self._switches.measure(times, force, now)
         return SensorFrame(
             time=now,
@@ -195,7 +199,7 @@ class SimRobot:
             joint_valid=all_valid(N_JOINTS),
             voltage=round(voltage, 1),
             voltage_valid=True,
-            imu=self._imu.measure(np.array(times), samples[:, :9]),
+            imu=self._imu.measure(np.array(times), self._inertial.means(count), sensed[:, :3]),
             contact=contact,
             contact_time=np.full(N_LEGS, contact_time),
             contact_valid=all_valid(N_LEGS),
@@ -215,8 +219,6 @@ class SimRobot:
         option, advance, mj_step = model.opt, self._bank.advance, mujoco.mj_step
         sensed = data.sensordata[world.sensor : world.sensor + 15]
         pose, twist = data.qpos[world.q : world.q + 7], data.qvel[world.v : world.v + 6]
-        mount, window = self._robot.parameters.sensors.imu, self._imu_steps * self.config.physics_period
-        before = sensor_motion(pose.tolist(), twist.tolist(), mount)
         flags = option.disableflags & ~_SENSORS_OFF
         times: list[float] = []
         option.disableflags = flags | _SENSORS_OFF
@@ -231,11 +233,8 @@ class SimRobot:
             option.disableflags = flags
             mj_step(model, data)
             option.disableflags = flags | _SENSORS_OFF
-            after = sensor_motion(pose.tolist(), twist.tolist(), mount)
-            row = self._samples[len(times)]
-            row[:6] = window_means(before, after, window)
-            row[6:] = sensed
-            before = after
+            self._inertial.mark(len(times), pose, twist)
+            self._sensed[len(times)] = sensed
             self._truth.look_for_contacts()
             times.append((step + 1) * self.config.physics_period)
         self._step += self._steps

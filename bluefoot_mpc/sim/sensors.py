@@ -49,39 +49,41 @@ class Imu:
         )
         self._samples = 0
 
-    def measure(self, time: FloatArray, truth: FloatArray) -> ImuBatch:
+    def measure(self, time: FloatArray, inertial: FloatArray, field: FloatArray) -> ImuBatch:
         """Samples of one frame.
 
         Args:
             time: (n,) s.
-            truth: (n, 9) angular velocity, specific force and magnetic field
-                at the sensor in the base frame.
+            inertial: (n, 6) true angular velocity (rad/s) and specific force
+                (m/s²) at the sensor, base frame.
+            field: (n, 3) true magnetic field over its strength, base frame.
         """
         config, count = self._config, len(time)
         noise = self._gyro.standard_normal((count + 1, 3))
         gyro = config.gyro_noise * noise[:count]
         gyro += self.gyro_bias
-        gyro += truth[:, 0:3]
+        gyro += inertial[:, 0:3]
         span = count * config.imu_period
         self.gyro_bias = self.gyro_bias + (config.gyro_drift * math.sqrt(span / _MINUTE)) * noise[count]
         accel = self._accel.standard_normal((count, 3))
         accel *= config.accel_noise
         accel += self.accel_bias
-        accel += truth[:, 3:6]
+        accel += inertial[:, 3:6]
         batch = ImuBatch(
-            time=time, gyro=gyro, accel=accel, magnetometer=self._field(truth), valid=all_valid(count)
+            time=time, gyro=gyro, accel=accel, magnetometer=self._field(field), valid=all_valid(count)
         )
         self._samples += count
         return batch
 
     def _field(self, truth: FloatArray) -> FloatArray:
+        """The rows where the slower magnetometer has a sample; NaN between them."""
         config, count = self._config, len(truth)
         field = np.empty((count, 3))
         field.fill(math.nan)
         for row in range(-self._samples % config.magnetometer_divider, count, config.magnetometer_divider):
             noise = self._magnetometer.standard_normal(3)
             noise *= config.magnetometer_noise
-            field[row] = truth[row, 6:9] + self.magnetometer_bias + noise
+            field[row] = truth[row] + self.magnetometer_bias + noise
         return field
 
 
