@@ -1,9 +1,9 @@
 """Named gaits: how the four oscillators couple, and how one gait becomes another.
 
-House leg order FL, FR, RL, RR. The matrices are those of the paper's chapter 5
-after the corrections that make them produce the footfall orders it shows: the
-first locks diagonal pairs, the transpose of the second's lower rows gives the
-lateral sequence.
+House leg order FL, FR, RL, RR. The matrices are those of the paper's chapter 5,
+corrected so that they give the footfall orders it shows: the trot's as
+printed (with -1 in the third row), the walk's is the transpose of the printed
+one and gives the lateral sequence. `transition` leads from one to the other.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ class FootholdConfig:
     law: Literal["virtual_force", "minimum_jerk"] = "virtual_force"  # horizontal profile
     vertical: Literal["sine", "quintic"] = "sine"  # sine: step height follows y2, as printed
     stance_lead: float = 0.5  # share of the stance's travel by which feet land ahead; 0 as printed
-    swing_rate: float = 6.5  # sqrt(k_c/m) times the swing time, 1
+    swing_rate: float = 9.0  # sqrt(k_c/m) times the swing time, 1
     damping_ratio: float = 1.05  # b_c / (2 sqrt(k_c m)), >= 1
     ground_damping: bool = False  # damp speed over ground (printed law; lags), not over the foothold
     ground_matching: float = 1.0  # minimum_jerk: 1 leaves and lands at rest on the ground, 0 in b'

@@ -13,15 +13,15 @@ from bluefoot_mpc.settings import require_nonnegative, require_positive, require
 class GaitTiming:
     """Timing, coupling and step height of one gait."""
 
-    swing_share: float = 0.36  # share of the cycle in swing, measured in the coupled network, 1
+    swing_share: float = 0.34  # share of the cycle in swing, measured in the coupled network, 1
     coupling_gain: float = 0.15  # strength of K over ω_s, 1
-    a_v: float = 300.0  # ω_s per speed, rad/m
+    a_v: float = 380.0  # ω_s per speed, rad/m
     a_omega: float = 40.0  # ω_s per yaw rate, rad/rad
-    cycle_min: float = 0.4  # shortest cycle, s
-    cycle_max: float = 0.7  # longest cycle, s
+    cycle_min: float = 0.34  # shortest cycle, s
+    cycle_max: float = 0.38  # longest cycle, s
     height_v: float = 0.15  # α_v, step height per speed, m per m/s
     height_omega: float = 0.02  # α_ω, step height per yaw rate, m per rad/s
-    height_min: float = 0.015  # lowest step, m
+    height_min: float = 0.017  # lowest step, m
     height_max: float = 0.035  # highest step, m
 
     def __post_init__(self) -> None:

@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
+from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.cpg import CpgConfig, CpgInputs, CpgIntegrator, CpgState
 from bluefoot_mpc.gait.network import coming_to_rest, gated
+from bluefoot_mpc.gait.transition import Transition
 from tests.gait.walker import DT, STANCE, command, drive, make
 
 
@@ -73,6 +75,26 @@ def test_gate_holds_a_leg_back() -> None:
     after = gated(integrator, near, inputs, 0.01, 3)
     assert after.y2[1] == near.y2[1]
     assert after.y2[3] == near.y2[3]
+
+
+def test_with_three_to_stand_on_a_hind_leg_waits_for_its_diagonal_front_leg() -> None:
+    integrator = CpgIntegrator(CpgConfig())
+    inputs = CpgInputs(omega=20.0, alpha=0.3, matrix=(0.0,) * 16)
+    pair = CpgState(y1=(-0.95, 1.0, 1.0, -1.0), y2=(-0.3, -0.1, -0.1, -1e-3))  # RR a little early
+    assert gated(integrator, pair, inputs, 0.01, 3).y2[3] == pair.y2[3]
+    landed = CpgState(y1=(0.95, 1.0, 1.0, -1.0), y2=(-0.3, -0.1, -0.1, -1e-3))
+    assert gated(integrator, landed, inputs, 0.01, 3).y2[3] > 0.0
+
+
+def test_the_way_shortens_swings_before_it_changes_the_order() -> None:
+    way = Transition(GaitConfig())
+    middle = way.rhythm(0.5)
+    assert middle.share == pytest.approx(way.walk.rhythm.share, abs=1e-3)
+    assert middle.matrix == way.trot.rhythm.matrix
+    assert way.rhythm(0.0) is way.trot.rhythm
+    assert way.rhythm(1.0) is way.walk.rhythm
+    assert way.least_stance(0.4) == 2
+    assert way.least_stance(0.6) == 3
 
 
 def test_on_the_way_to_rest_only_flying_legs_move() -> None:
