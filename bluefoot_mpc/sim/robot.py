@@ -245,16 +245,21 @@ class SimRobot:
         commands = self._commands
         while commands and commands[0][0] <= step:
             self._bank.write(commands.popleft()[1])
-        active = [push for push in self._pushes if push[0] <= step < push[1]]
+        self._next_event = commands[0][0] if commands else _NEVER
+        if self._pushes:
+            self._next_event = min(self._next_event, self._push(step))
+
+    def _push(self, step: int) -> int:
+        """Bring the pushes of a step into force; returns the step at which they change next."""
         self._pushes = [push for push in self._pushes if step < push[1]]
-        self._force = np.sum([push[2] for push in active], axis=0) if active else np.zeros(3)
+        self._force = np.zeros(3)
+        for start, _, force in self._pushes:
+            if start <= step:
+                self._force += force
         # The free joint's first three forces act on the trunk's origin, in world axes.
         v = self._world.v
         self._world.data.qfrc_applied[v : v + 3] = self._force
-        ahead = [edge for push in self._pushes for edge in push[:2] if edge > step]
-        if commands:
-            ahead.append(commands[0][0])
-        self._next_event = min(ahead, default=_NEVER)
+        return min((edge for push in self._pushes for edge in push[:2] if edge > step), default=_NEVER)
 
 
 def _backlash(robot: RobotModel, config: SimConfig) -> float:

@@ -28,8 +28,11 @@ def test_no_load_speed_is_59_rpm():
     bench = Bench(parameters(**NO_FRICTION))
     bench.data.qpos[:] = -2.5
     bench.command(2.5)
-    speed = bench.run(0.5)[:, 1].max()
+    speed = bench.run(0.3)[-1, 1]
     assert speed * 60 / (2 * np.pi) == pytest.approx(59.0, rel=0.005)
+    # All of the voltage goes into back-EMF: no torque is left, and no current.
+    assert bench.bank.duty[0] == 1.0
+    assert bench.bank.torque[0] == pytest.approx(0.0, abs=0.01)
 
 
 def test_friction_costs_a_few_percent_of_the_no_load_speed():
