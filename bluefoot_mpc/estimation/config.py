@@ -56,15 +56,20 @@ class ContactConfig:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class JointFilterConfig:
-    """Tracking filter of joint angles; its lag is (alpha / beta - 1/2) periods."""
+    """Tracking filter of joint angles; its lag is (alpha / beta - 1/2) periods.
 
-    alpha: float = 0.9  # share of a new angle
-    beta: float = 0.6  # share of a new difference
+    The defaults (6 ms at 50 Hz) had the smallest error while trotting: at four
+    steps of the servo a period, lag costs more than rounding does.
+    """
+
+    alpha: float = 1.0  # share of a new angle
+    beta: float = 1.25  # share of a new difference; above 1 it looks ahead
     memory: float = 0.1  # s, decay of the speed of a joint that does not answer
     lost_after: float = 0.1  # s without an answer until a leg is not used
 
     def __post_init__(self) -> None:
-        require_range(0.05, 1.0, alpha=self.alpha, beta=self.beta)
+        require_range(0.05, 1.0, alpha=self.alpha)
+        require_range(0.05, 1.5, beta=self.beta)
         require_positive(memory=self.memory, lost_after=self.lost_after)
 
 

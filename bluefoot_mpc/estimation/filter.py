@@ -135,8 +135,8 @@ def transition(
     """Linear propagation of the error over one frame.
 
     Args:
-        rotation: (3, 3) rotation_base_to_world in the middle of the frame.
-        velocity: (3,) m/s, world.
+        rotation: (3, 3) rotation_base_to_world; anywhere in the frame will do.
+        velocity: (3,) m/s, world, mean over the frame.
         feet: (4, 3) m, relative to the IMU, world axes.
         dt: s.
 
@@ -181,7 +181,7 @@ def predict(
         dt: s.
         config: drifts and slip.
     """
-    velocity = np.array(state.velocity)
+    velocity = 0.5 * (np.array(state.velocity) + motion.velocity)
     feet = state.feet + roll - np.array(motion.displacement)
     rotation = rotation_matrix(motion.quaternion)
     step, lever = transition(rotation, velocity, state.feet, dt)

@@ -105,12 +105,13 @@ def heading_row(
     """
     qx, qy, qz, qw = state.quaternion
     yaw = math.atan2(2.0 * (qx * qy + qz * qw), 1.0 - 2.0 * (qy * qy + qz * qz))
-    c, s = math.cos(yaw) - 1.0, math.sin(yaw)
+    c, s = math.cos(yaw), math.sin(yaw)
     ux, uy = direction
-    # Sideways part of (Rz(yaw) - 1) h, along t = (-uy, ux), over the strength.
-    wx, wy = (-uy * c + ux * s) / strength, (uy * s + ux * c) / strength
+    # Sideways part of (Rz(yaw) - 1) h, along t = (-uy, ux), over the strength, and its slope by the yaw.
+    wx, wy = (-uy * (c - 1.0) + ux * s) / strength, (uy * s + ux * (c - 1.0)) / strength
     hx, hy = state.hard_iron
+    slope = ((uy * s + ux * c) * hx + (uy * c - ux * s) * hy) / strength
     row = np.zeros(SIZE)
-    row[YAW] = 1.0
+    row[YAW] = 1.0 - slope
     row[HARD_IRON_X], row[HARD_IRON_Y] = -wx, -wy
     return row, wx * hx + wy * hy
