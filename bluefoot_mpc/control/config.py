@@ -20,7 +20,7 @@ class ControlConfig:
     estimator: EstimatorConfig = field(default_factory=EstimatorConfig)
     gait: GaitConfig = field(default_factory=GaitConfig)
     posture: PostureConfig = field(default_factory=PostureConfig)
-    ankle: AnkleConfig = field(default_factory=AnkleConfig)
+    ankle: AnkleConfig = field(default_factory=lambda: AnkleConfig(policy="margin"))
     zmp: PlacementConfig = field(default_factory=PlacementConfig)
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
     modes: ModeConfig = field(default_factory=ModeConfig)

@@ -15,7 +15,13 @@ from bluefoot_mpc.settings import require_nonnegative, require_positive
 
 def _walk_timing() -> GaitTiming:
     return GaitTiming(
-        swing_share=0.2, a_v=300.0, a_omega=60.0, cycle_min=1.1, cycle_max=1.3, height_min=0.02, height_max=0.03
+        swing_share=0.2,
+        a_v=300.0,
+        a_omega=60.0,
+        cycle_min=1.1,
+        cycle_max=1.3,
+        height_min=0.02,
+        height_max=0.03,
     )
 
 

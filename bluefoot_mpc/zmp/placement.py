@@ -22,13 +22,13 @@ class PlacementConfig:
     """Gains of the placement law."""
 
     enabled: bool = True
-    gain: float = 3.0  # 1/s, K_Z
-    lead: float = 0.3  # s, how far ahead legs in swing are looked for: makes up for the law's own lag
+    gain: float = 4.0  # 1/s, K_Z
+    lead: float = 0.2  # s, how far ahead legs in swing are looked for: makes up for the law's own lag
     boundary_gain: float = 0.002  # K_F, (m/s)·kg per unit of boundary force
     boundary_sharpness: float = 120.0  # 1/m, k_l
     reach_min: float = 0.17  # m, trunk origin to foot
     reach_max: float = 0.32  # m
-    max_offset: float = 0.05  # m, from the neutral place
+    max_offset: float = 0.025  # m, from the neutral place
     max_rate: float = 0.25  # m/s
 
     def __post_init__(self) -> None:
