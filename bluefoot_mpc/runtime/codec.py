@@ -32,6 +32,7 @@ from bluefoot_mpc.exceptions import LogError
 
 T = TypeVar("T")
 Convert = Callable[[Any], Any]
+Values = Callable[[Any], tuple[Any, ...]]
 
 _OPTIONS = orjson.OPT_SERIALIZE_NUMPY
 
@@ -44,14 +45,14 @@ def encode(record: Any) -> bytes:
             (a float32 array in a float64 field would come back rounded).
     """
     plan = _plan(type(record))
-    if not plan.has_bytes(record):
+    optional = plan.optional(record)
+    if not plan.has_bytes and (not plan.may_have_bytes or optional.count(None) == len(optional)):
         data = orjson.dumps(record, _to_list, _OPTIONS)
-        # Every null and [] of a plain record stands for a None or an empty tuple;
-        # more of them mean NaN, which null tells well enough, or a special case.
-        nulls, empties = plan.expected(record)
-        if data.count(b"null") == nulls and data.count(b"[]") == empties:
-            return data
-        if not plan.is_special(record):
+        # Every null and [] of a plain record stands for a None or an empty tuple. More
+        # nulls are NaN or infinities, more [] arrays without entries.
+        nulls, empties = optional.count(None), plan.tuples(record).count(())
+        plain_nulls = data.count(b"null") == nulls or not plan.holds_infinity(record)
+        if plain_nulls and data.count(b"[]") == empties:
             return data
     return orjson.dumps(plan.to_table(record), _to_list, _OPTIONS)
 
@@ -76,28 +77,19 @@ class _Plan:
     cls: type
     writers: tuple[tuple[str, Convert | None], ...]
     readers: tuple[tuple[str, Convert, bool], ...]
-    optional: tuple[Convert, ...]
-    bytes_holders: tuple[Convert, ...]
-    tuples: tuple[Convert, ...]
-    arrays: tuple[Convert, ...]
-    floats: tuple[Convert, ...]
+    has_bytes: bool
+    may_have_bytes: bool
+    optional: Values
+    tuples: Values
+    arrays: Values
+    floats: Values
 
-    def has_bytes(self, record: Any) -> bool:
-        return any(get(record) is not None for get in self.bytes_holders)
-
-    def expected(self, record: Any) -> tuple[int, int]:
-        """How many None and empty tuples the record holds."""
-        return sum(get(record) is None for get in self.optional), sum(not get(record) for get in self.tuples)
-
-    def is_special(self, record: Any) -> bool:
-        """True where orjson's own text would lose an infinity or a shape."""
-        if any(get(record) is not None for get in self.optional):
+    def holds_infinity(self, record: Any) -> bool:
+        """True where a number is infinite, or an optional record is there that may hold one."""
+        optional = self.optional(record)
+        if optional.count(None) < len(optional) or any(map(math.isinf, self.floats(record))):
             return True
-        arrays = [get(record) for get in self.arrays]
-        if any(array.size == 0 and array.ndim > 1 for array in arrays):
-            return True
-        if any(math.isinf(get(record)) for get in self.floats):
-            return True
+        arrays = self.arrays(record)
         return bool(arrays) and bool(np.isinf(np.concatenate(arrays, axis=None)).any())
 
     def to_table(self, record: Any) -> dict[str, Any]:
@@ -122,11 +114,12 @@ def _make_plan(cls: type) -> _Plan:
         cls=cls,
         writers=tuple((f.name, _writer(hints[f.name])) for f in fields),
         readers=tuple((f.name, _reader(hints[f.name]), _has_default(f)) for f in fields),
-        optional=_getters(cls, lambda hint: unwrap_optional(hint)[1]),
-        bytes_holders=_getters(cls, _holds_bytes),
-        tuples=_getters(cls, lambda hint: typing.get_origin(hint) is tuple),
-        arrays=_getters(cls, lambda hint: array_type(hint) is not None),
-        floats=_getters(cls, lambda hint: hint is float),
+        has_bytes=bool(_paths(cls, lambda hint: array_type(hint) == np.uint8)),
+        may_have_bytes=bool(_paths(cls, _may_have_bytes)),
+        optional=_values(_paths(cls, lambda hint: unwrap_optional(hint)[1])),
+        tuples=_values(_paths(cls, lambda hint: typing.get_origin(hint) is tuple)),
+        arrays=_values(_paths(cls, lambda hint: getattr(array_type(hint), "kind", "") == "f")),
+        floats=_values(_paths(cls, lambda hint: hint is float)),
     )
 
 
@@ -159,23 +152,35 @@ def _has_default(field: dataclasses.Field[Any]) -> bool:
     return field.default is not dataclasses.MISSING or field.default_factory is not dataclasses.MISSING
 
 
-def _getters(cls: type, wanted: Callable[[Any], bool], prefix: str = "") -> tuple[Convert, ...]:
-    """Getters of the wanted fields of a record and of the records that it always holds."""
-    found: list[Convert] = []
+def _paths(cls: type, wanted: Callable[[Any], bool], prefix: str = "") -> list[str]:
+    """Dotted names of the wanted fields of a record and of the records that it always holds."""
+    found: list[str] = []
     for name, hint in typing.get_type_hints(cls).items():
         if wanted(hint):
-            found.append(operator.attrgetter(prefix + name))
+            found.append(prefix + name)
         elif is_record(hint):
-            found.extend(_getters(hint, wanted, f"{prefix}{name}."))
-    return tuple(found)
+            found.extend(_paths(hint, wanted, f"{prefix}{name}."))
+    return found
 
 
-def _holds_bytes(hint: Any) -> bool:
-    """True where a field needs its own writing whenever it is there."""
+def _values(paths: list[str]) -> Values:
+    """Function that gives a record's values at some dotted names."""
+    if not paths:
+        return lambda record: ()
+    get = operator.attrgetter(*paths)
+    return get if len(paths) > 1 else lambda record: (get(record),)
+
+
+def _may_have_bytes(hint: Any) -> bool:
+    """True of optional pictures, and of optional records with pictures in them."""
     inner, optional = unwrap_optional(hint)
-    if array_type(inner) == np.uint8:
-        return True
-    return optional and is_record(inner) and any(map(_holds_bytes, typing.get_type_hints(inner).values()))
+    if not optional:
+        return False
+    if is_record(inner):
+        return any(
+            array_type(h) == np.uint8 or _may_have_bytes(h) for h in typing.get_type_hints(inner).values()
+        )
+    return array_type(inner) == np.uint8
 
 
 def _writer(hint: Any) -> Convert | None:
