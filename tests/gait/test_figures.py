@@ -4,12 +4,12 @@ import pytest
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.gait.couplings import COUPLINGS
 from bluefoot_mpc.gait.figures import Sampling, cpg_series, footfall_pattern, transition_series
-from tests.gait.walker import STANCE
+from tests.gait.walker import REFERENCE, STANCE
 
 
 @pytest.mark.parametrize("gait", COUPLINGS)
 def test_series_is_a_closed_cycle(gait: str) -> None:
-    series = cpg_series(gait, Sampling(duration=5.0))
+    series = cpg_series(gait, Sampling(duration=5.0, config=REFERENCE))
     assert series.time.shape == (1000,)
     assert series.y1.shape == series.y2.shape == (1000, 4)
     radius = np.hypot(series.y1, series.y2)
@@ -23,7 +23,7 @@ def test_series_is_a_closed_cycle(gait: str) -> None:
 
 @pytest.mark.parametrize(("first", "second"), [("trot", "walk"), ("walk", "trot")])
 def test_transition_goes_from_one_pattern_to_the_other(first: str, second: str) -> None:
-    series = transition_series(first, second, change_at=2.0)
+    series = transition_series(first, second, 2.0, Sampling(duration=12.0, config=REFERENCE))
     assert series.gait == f"{first} to {second}"
     assert series.blend[0] == 0.0
     assert series.blend[-1] == 1.0
@@ -36,7 +36,7 @@ def test_transition_goes_from_one_pattern_to_the_other(first: str, second: str) 
 
 @pytest.mark.parametrize(("gait", "least", "duty"), [("trot", 2, 0.64), ("walk", 3, 0.78)])
 def test_footfall_pattern_at_40_mm_per_s(gait: str, least: int, duty: float) -> None:
-    pattern = footfall_pattern(gait, STANCE)
+    pattern = footfall_pattern(gait, STANCE, Sampling(dt=0.01, config=REFERENCE))
     assert pattern.stance.sum(axis=1).min() == least
     np.testing.assert_allclose(pattern.duty, duty, atol=0.04)
     if gait == "walk":

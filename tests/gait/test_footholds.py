@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from bluefoot_mpc.gait.footholds import FootholdConfig
-from bluefoot_mpc.gait.timing import GaitTiming
-from tests.gait.walker import DT, STANCE, command, drive, make
+from tests.gait.walker import DT, FOOTHOLD, STANCE, TROT_TIMING, command, drive, make
 
-EARLY = FootholdConfig(early_contact=True, early_progress=0.5, offset_time=0.5)
+EARLY = replace(FOOTHOLD, early_contact=True, early_progress=0.5, offset_time=0.5)
 DOWN = np.ones(4, dtype=bool)
 UP = np.array([False, True, True, True])
 
@@ -74,7 +73,7 @@ def test_the_shift_is_bounded() -> None:
 
 @pytest.mark.parametrize("law", ["virtual_force", "minimum_jerk"])
 def test_replaced_footholds_are_met_once(law: str) -> None:
-    walker = make(foothold=FootholdConfig(law=law))
+    walker = make(foothold=replace(FOOTHOLD, law=law))
     drive(walker, command(0.06), 3.0)
     while walker.state.feet[1].swinging or walker.state.feet[1].turning:
         walker.step(command(0.06), DT)
@@ -91,7 +90,7 @@ def test_replaced_footholds_are_met_once(law: str) -> None:
 
 
 def test_a_foothold_given_in_flight_waits_on_the_smooth_path() -> None:
-    walker = make(foothold=FootholdConfig(law="minimum_jerk"))
+    walker = make(foothold=replace(FOOTHOLD, law="minimum_jerk"))
     output = to_progress(walker, 0.5)
     walker.set_footholds(STANCE + 0.02, DOWN)
     after = walker.step(command(0.08), DT)
@@ -112,8 +111,8 @@ def test_rows_that_are_not_finite_are_ignored() -> None:
 
 
 def test_printed_damping_lags_behind_its_foothold_by_a_known_amount() -> None:
-    timing = GaitTiming(cycle_min=0.5, cycle_max=0.5)
-    config = FootholdConfig(ground_damping=True)
+    timing = replace(TROT_TIMING, cycle_min=0.5, cycle_max=0.5)
+    config = replace(FOOTHOLD, ground_damping=True)
     ahead = {}
     for name, foothold in (("printed", config), ("ours", replace(config, ground_damping=False))):
         walker = make(timing, foothold, max_acceleration=1.0)

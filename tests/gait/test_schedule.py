@@ -1,18 +1,18 @@
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from bluefoot_mpc.gait.couplings import COUPLINGS
-from bluefoot_mpc.gait.footholds import FootholdConfig
-from tests.gait.walker import DT, STANCE, command, drive, make
+from tests.gait.walker import DT, FOOTHOLD, STANCE, command, drive, make
 
 
 @pytest.mark.parametrize("law", ["virtual_force", "minimum_jerk"])
 @pytest.mark.parametrize("gait", COUPLINGS)
 @pytest.mark.parametrize("before", [0.0, 0.3, 2.0, 2.13])
 def test_schedule_is_what_happens_later(gait: str, law: str, before: float) -> None:
-    walker = make(foothold=FootholdConfig(law=law))
+    walker = make(foothold=replace(FOOTHOLD, law=law))
     inputs = command(0.06, 0.15, gait)
     drive(walker, inputs, before)
     walker.step(inputs, DT)
@@ -44,7 +44,7 @@ def test_schedule_names_the_next_foothold_of_a_swinging_foot() -> None:
 
 
 def test_a_swing_that_does_not_end_within_the_horizon_is_predicted() -> None:
-    walker = make(foothold=FootholdConfig(law="minimum_jerk"))
+    walker = make(foothold=replace(FOOTHOLD, law="minimum_jerk"))
     inputs = command(0.08)
     drive(walker, inputs, 3.0)
     while not walker.step(inputs, DT).phase.swing[0]:

@@ -1,18 +1,23 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.cpg import CpgConfig, CpgInputs, CpgIntegrator, CpgState
+from bluefoot_mpc.gait.gait import Gait
 from bluefoot_mpc.gait.network import coming_to_rest, gated
 from bluefoot_mpc.gait.transition import Transition
-from tests.gait.walker import DT, STANCE, command, drive, make
+from tests.gait.walker import DT, REFERENCE, STANCE, command, drive, make
 
 
-@pytest.mark.parametrize("blend_time", [0.1, 4.0])
+@pytest.mark.parametrize(
+    "config", [replace(REFERENCE, blend_time=0.1), replace(REFERENCE, blend_time=4.0), GaitConfig()]
+)
 @pytest.mark.parametrize(("first", "second"), [("trot", "walk"), ("walk", "trot")])
-def test_transition_from_any_phase(first: str, second: str, blend_time: float) -> None:
+def test_transition_from_any_phase(first: str, second: str, config: GaitConfig) -> None:
     for phase in range(0, 24, 2):
-        walker = make(blend_time=blend_time)
+        walker = Gait(config, STANCE)
         drive(walker, command(0.06, gait=first), 1.0 + 0.04 * phase)
         run = drive(walker, command(0.06, gait=second), 9.0)
         flying = run.swing.sum(axis=1)
@@ -23,7 +28,7 @@ def test_transition_from_any_phase(first: str, second: str, blend_time: float) -
             assert swing[0] == swing[3]  # two in the air are always a diagonal pair
         # Nobody is left behind: stance never lasts much longer than a cycle.
         assert longest(~run.swing) * DT < 1.15 * run.cycle_time.max()
-        assert np.abs(run.foot_position - STANCE)[..., :2].max() < 0.04
+        assert np.abs(run.foot_position - STANCE)[..., :2].max() < 0.75 * 0.06 * run.cycle_time.max() + 0.003
         lifts = [np.flatnonzero(~run.swing[:-1, leg] & run.swing[1:, leg])[-1] for leg in range(4)]
         period = run.cycle_time[-1] / DT
         lag = ((np.array(lifts) - lifts[0]) / period) % 1.0
@@ -87,7 +92,7 @@ def test_with_three_to_stand_on_a_hind_leg_waits_for_its_diagonal_front_leg() ->
 
 
 def test_the_way_shortens_swings_before_it_changes_the_order() -> None:
-    way = Transition(GaitConfig())
+    way = Transition(REFERENCE)
     middle = way.rhythm(0.5)
     assert middle.share == pytest.approx(way.walk.rhythm.share, abs=1e-3)
     assert middle.matrix == way.trot.rhythm.matrix
