@@ -20,6 +20,16 @@ MAX_FRAMES = 6000
 """Most frames that a page carries: two minutes at 50 Hz; longer runs are thinned."""
 
 
+def scene_data(scene: RobotScene, foot_radius: float) -> dict[str, Any]:
+    """The robot itself, ready for JSON; `foot_radius` in m."""
+    return {
+        "commands": scene_commands(scene),
+        "nodes": [_node(node) for node in scene.nodes],
+        "legs": [{"name": leg, "colour": LEG_COLOURS[leg]} for leg in LEGS],
+        "footRadius": foot_radius,
+    }
+
+
 def animation_data(scene: RobotScene, series: RunSeries, foot_radius: float) -> dict[str, Any]:
     """Everything the replay needs, ready for JSON.
 
@@ -33,10 +43,7 @@ def animation_data(scene: RobotScene, series: RunSeries, foot_radius: float) -> 
     modes = sorted(set(series.mode))
     ground = _ground_plane(series, foot_radius)
     return {
-        "commands": scene_commands(scene),
-        "nodes": [_node(node) for node in scene.nodes],
-        "legs": [{"name": leg, "colour": LEG_COLOURS[leg]} for leg in LEGS],
-        "footRadius": foot_radius,
+        **scene_data(scene, foot_radius),
         "ground": ground,
         "time": pack(series.time[pick]),
         "q": pack(series.q[pick]),

@@ -9,6 +9,7 @@ reads; nothing here starts a server.
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -105,9 +106,12 @@ def build_scene(robot: RobotLike) -> RobotScene:
 
 def scene_commands(scene: RobotScene) -> list[Command]:
     """Commands that put the robot into a viewer, standing as at q = 0."""
-    commands = [transform(node.path, node.placement) for node in scene.nodes]
-    for visual in scene.visuals:
-        commands += shape_commands(visual)
+    commands: list[Command] = []
+    for node in scene.nodes:
+        commands.append(transform(node.path, node.placement))
+        own = [visual for visual in scene.visuals if visual.path.startswith(f"{node.path}/visual/")]
+        # One command per body: a browser that draws slowly takes few at a time.
+        commands.append(group(f"{node.path}/visual", own))
     return commands
 
 
@@ -130,39 +134,33 @@ def pose_commands(scene: RobotScene, q: FloatArray) -> list[Command]:
     return [transform(node.path, matrix) for node, matrix in zip(scene.nodes, matrices, strict=True)]
 
 
-def shape_commands(visual: Visual) -> list[Command]:
-    """Commands that add one shape and put it in its place."""
-    # Three.js draws cylinders along y.
-    placement = visual.placement @ _Y_TO_Z if visual.shape == "cylinder" else visual.placement
-    geometry = {"uuid": f"{visual.path}#g", **_geometry(visual.shape, visual.size)}
-    return [mesh(visual.path, geometry, visual.colour, visual.opacity), transform(visual.path, placement)]
+def group(path: str, visuals: Sequence[Visual]) -> Command:
+    """Command that adds several shapes, each in its place, as one object."""
+    parts = [_part(visual) for visual in visuals]
+    body = {"uuid": f"{path}#o", "type": "Group", "children": [child for _, _, child in parts]}
+    return _object(path, [geometry for geometry, _, _ in parts], [material for _, material, _ in parts], body)
 
 
-def mesh(path: str, geometry: dict[str, Any], colour: int, opacity: float = 1.0) -> Command:
-    """Command that adds a mesh with a matt material."""
-    material = {
-        "uuid": f"{path}#m", "type": "MeshPhongMaterial", "color": colour, "shininess": 40,
-        "specular": 0x2A2A2A, "side": 2, "transparent": opacity < 1.0, "opacity": opacity,
-    }  # fmt: skip
-    body = {"uuid": f"{path}#o", "type": "Mesh", "geometry": f"{path}#g", "material": f"{path}#m"}
-    return _object(path, geometry, material, body)
+def shape(visual: Visual) -> Command:
+    """Command that adds one shape in its place."""
+    geometry, material, body = _part(visual)
+    return _object(visual.path, [geometry], [material], body)
+
+
+def surface(
+    path: str, points: FloatArray, triangles: list[int], colour: int, opacity: float = 1.0
+) -> Command:
+    """Command that adds a surface of (n, 3) corners (m, world) and triples of corner numbers."""
+    geometry = {"uuid": f"{path}#g", **_buffer(points, triangles)}
+    material = _matt(path, colour, opacity)
+    return _object(path, [geometry], [material], _mesh(path))
 
 
 def line(path: str, points: FloatArray, colour: int) -> Command:
     """Command that adds a poly-line through (n, 3) points (m, world)."""
-    geometry = {"uuid": f"{path}#g", **buffer_geometry(points)}
+    geometry = {"uuid": f"{path}#g", **_buffer(points)}
     material = {"uuid": f"{path}#m", "type": "LineBasicMaterial", "color": colour, "linewidth": 2}
-    body = {"uuid": f"{path}#o", "type": "Line", "geometry": f"{path}#g", "material": f"{path}#m"}
-    return _object(path, geometry, material, body)
-
-
-def buffer_geometry(points: FloatArray, triangles: list[int] | None = None) -> dict[str, Any]:
-    """Free-form geometry of (n, 3) points, with triples of corner numbers for a surface."""
-    position = {"itemSize": 3, "type": "Float32Array", "array": [round(float(x), 5) for x in points.ravel()]}
-    data: dict[str, Any] = {"attributes": {"position": position}}
-    if triangles is not None:
-        data["index"] = {"type": "Uint16Array", "array": triangles}
-    return {"type": "BufferGeometry", "data": data}
+    return _object(path, [geometry], [material], {**_mesh(path), "type": "Line"})
 
 
 def transform(path: str, matrix: FloatArray) -> Command:
@@ -187,13 +185,51 @@ def hex_colour(colour: str) -> int:
     return int(colour.removeprefix("#"), 16)
 
 
-def _object(path: str, geometry: dict[str, Any], material: dict[str, Any], body: dict[str, Any]) -> Command:
+def _object(
+    path: str, geometries: list[dict[str, Any]], materials: list[dict[str, Any]], body: dict[str, Any]
+) -> Command:
     content = {
         "metadata": {"version": 4.5, "type": "Object"},
-        "geometries": [geometry], "materials": [material],
-        "object": {**body, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]},
-    }  # fmt: skip
+        "geometries": geometries,
+        "materials": materials,
+        "object": body,
+    }
     return {"type": "set_object", "path": path, "object": content}
+
+
+def _part(visual: Visual) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """Geometry, material and mesh of one shape."""
+    # Three.js draws cylinders along y.
+    placement = visual.placement @ _Y_TO_Z if visual.shape == "cylinder" else visual.placement
+    geometry = {"uuid": f"{visual.path}#g", **_geometry(visual.shape, visual.size)}
+    matrix = [round(float(x), 7) for x in placement.T.ravel()]
+    body = {**_mesh(visual.path), "matrix": matrix, "castShadow": True, "receiveShadow": True}
+    return geometry, _matt(visual.path, visual.colour, visual.opacity), body
+
+
+def _mesh(path: str) -> dict[str, Any]:
+    return {"uuid": f"{path}#o", "type": "Mesh", "geometry": f"{path}#g", "material": f"{path}#m"}
+
+
+def _matt(path: str, colour: int, opacity: float) -> dict[str, Any]:
+    return {
+        "uuid": f"{path}#m",
+        "type": "MeshPhongMaterial",
+        "color": colour,
+        "shininess": 40,
+        "specular": 0x2A2A2A,
+        "side": 2,
+        "transparent": opacity < 1.0,
+        "opacity": opacity,
+    }
+
+
+def _buffer(points: FloatArray, triangles: list[int] | None = None) -> dict[str, Any]:
+    position = {"itemSize": 3, "type": "Float32Array", "array": [round(float(x), 5) for x in points.ravel()]}
+    data: dict[str, Any] = {"attributes": {"position": position}}
+    if triangles is not None:
+        data["index"] = {"type": "Uint16Array", "array": triangles}
+    return {"type": "BufferGeometry", "data": data}
 
 
 def _nodes(model: Any) -> tuple[Node, ...]:

@@ -106,9 +106,9 @@ def extract(run: RunData, stall_torque: float) -> RunSeries:
     time = _array([t.time for t in telemetry], n)
     start = float(time[0]) if n else 0.0
     nothing = np.full((n, 3), np.nan)
-    q = _array([t.q for t in truth] if has_truth else [_estimated_q(t) for t in telemetry], n, 23)
+    q = _array([t.q for t in truth] if has_truth else [estimated_q(t) for t in telemetry], n, 23)
     rpy = _array([rpy_from_quaternion(row) for row in q[:, 3:7]], n, 3)
-    feet_rows = [t.foot_position for t in truth] if has_truth else [_estimated_feet(t) for t in telemetry]
+    feet_rows = [t.foot_position for t in truth] if has_truth else [estimated_feet(t) for t in telemetry]
     feet = _array(feet_rows, n, 4, 3)
     switch = _array([f.contact for f in frames], n, 4).astype(bool)
     walking = _array([t.phase.walking for t in telemetry], n).astype(bool)
@@ -116,7 +116,7 @@ def extract(run: RunData, stall_torque: float) -> RunSeries:
     trunk_virtual = _array([t.reference.trunk_position[:2] for t in telemetry], n, 2)
     planned = np.stack([trunk_virtual, _array([t.zmp for t in telemetry], n, 2)])
     wanted_feet = _array([t.reference.foot_position[:, :2] for t in telemetry], n, 4, 2)
-    planned = _from_virtual(planned, wanted_feet, feet[:, :, :2], ~swing, rpy[:, 2])
+    planned = from_virtual(planned, wanted_feet, feet[:, :, :2], ~swing, rpy[:, 2])
     com = _array([t.com for t in truth], n, 3) if has_truth else nothing
     rates = [t.v[5] for t in truth] if has_truth else [t.estimate.angular_velocity[2] for t in telemetry]
     share = _array([f.joint_load for f in frames], n, 16)
@@ -159,10 +159,18 @@ def _measured_zmp(truth: Sequence[TruthSample], time: FloatArray, com: FloatArra
     return np.vstack([points, points[-1:]])
 
 
-def _from_virtual(
+def from_virtual(
     points: FloatArray, feet_virtual: FloatArray, feet: FloatArray, stance: BoolArray, yaw: FloatArray
 ) -> FloatArray:
-    """(k, n, 2) m, points of b' in the world: b' laid so that the wanted stance feet meet the real ones."""
+    """(k, n, 2) m, points of b' in the world: b' laid so that the wanted stance feet meet the real ones.
+
+    Args:
+        points: (k, n, 2) m, in b'.
+        feet_virtual: (n, 4, 2) m, wanted feet in b'.
+        feet: (n, 4, 2) m, real feet in the world.
+        stance: (n, 4) True where a foot is wanted on the ground.
+        yaw: (n,) rad, heading of the trunk in the world.
+    """
     weight = np.where(stance.any(axis=1, keepdims=True), stance, True).astype(float)
     weight /= weight.sum(axis=1, keepdims=True)
     middle_virtual = (weight[:, :, None] * feet_virtual).sum(axis=1)
@@ -177,12 +185,14 @@ def _array(rows: Sequence[Any], n: int, *shape: int) -> FloatArray:
     return np.array(rows, dtype=np.float64).reshape(n, *shape) if rows else np.zeros((n, *shape))
 
 
-def _estimated_q(telemetry: Telemetry) -> FloatArray:
+def estimated_q(telemetry: Telemetry) -> FloatArray:
+    """(23,) configuration as estimated, odometry frame."""
     state = telemetry.estimate
     return np.concatenate([state.position, state.quaternion, state.joint_position])
 
 
-def _estimated_feet(telemetry: Telemetry) -> FloatArray:
+def estimated_feet(telemetry: Telemetry) -> FloatArray:
+    """(4, 3) m, foot points as estimated, odometry frame."""
     state = telemetry.estimate
     rotation = rotation_from_quaternion(state.quaternion)
     return np.asarray(state.position + state.foot_position_in_base @ rotation.T)

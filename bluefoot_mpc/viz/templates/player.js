@@ -8,11 +8,15 @@ function unpack(packed) {
 }
 
 class Recording {
-  constructor(data) {
+  // With a capacity, room for that many frames to come; without, the frames in the data.
+  constructor(data, capacity) {
     this.data = data;
-    for (const key of ["time", "q", "feet", "states", "com", "zmp", "zmpPlan", "mode"]) this[key] = unpack(data[key]);
-    this.push = data.push ? unpack(data.push) : null;
-    this.count = this.time.length;
+    const widths = { time: 1, q: 23, feet: 12, states: 1, com: 3, zmp: 2, zmpPlan: 2, push: 3, mode: 1 };
+    for (const [key, width] of Object.entries(widths)) {
+      if (capacity) this[key] = key === "states" || key === "mode" ? new Uint8Array(capacity) : new Float32Array(width * capacity);
+      else this[key] = data[key] ? unpack(data[key]) : null;
+    }
+    this.count = this.room = this.time.length;
     this.width = this.count ? this.q.length / this.count : 23;
     this.duration = this.count ? this.time[this.count - 1] : 0;
   }
@@ -186,15 +190,22 @@ class View3D {
     for (const item of [...this.discs, this.support, this.edge, this.zmp]) item.renderOrder = 2;
   }
   pathLine(T, scene) {
-    const rec = this.rec, points = new Float32Array(3 * rec.count);
-    for (let i = 0; i < rec.count; i++) {
-      const x = rec.q[rec.width * i], y = rec.q[rec.width * i + 1];
-      points.set([x, y, rec.groundHeight(x, y) + 0.0015], 3 * i);
-    }
+    this.drawn = 0;
     this.path = new T.Line(new T.BufferGeometry(), new T.LineBasicMaterial({ color: 0x6b5bd2 }));
-    this.path.geometry.setAttribute("position", new T.BufferAttribute(points, 3));
+    this.path.geometry.setAttribute("position", new T.BufferAttribute(new Float32Array(3 * this.rec.room), 3));
     this.path.frustumCulled = false;
     scene.add(this.path);
+  }
+  // Lays the path up to frame i; what was laid before stays.
+  extendPath(i) {
+    const rec = this.rec, points = this.path.geometry.getAttribute("position");
+    if (i < this.drawn - 1 && rec.count < this.drawn) this.drawn = 0;
+    for (; this.drawn <= i; this.drawn++) {
+      const x = rec.q[rec.width * this.drawn], y = rec.q[rec.width * this.drawn + 1];
+      points.setXYZ(this.drawn, x, y, rec.groundHeight(x, y) + 0.0015);
+      points.needsUpdate = true;
+    }
+    this.path.geometry.setDrawRange(0, this.shown.path ? i + 1 : 0);
   }
   // Camera and target live in a frame that meshcat turns: world (x, y, z) is local (x, z, -y).
   preset(name) {
@@ -239,7 +250,7 @@ class View3D {
     }
     this.showGround(i, (leg, k) => mix(rec.feet, 12 * i + 3 * leg + k, 12 * j + 3 * leg + k));
     this.showPush(i, trunk);
-    this.path.geometry.setDrawRange(0, this.shown.path ? i + 1 : 0);
+    this.extendPath(i);
     this.move(trunk);
     this.viewer.set_dirty();
   }
@@ -295,10 +306,7 @@ class PlanView {
   constructor(canvas, recording) {
     this.canvas = canvas; this.rec = recording; this.time = 0;
     this.half = 0.2;  // m shown to each side: what the first stance needs
-    for (let leg = 0; leg < 4 && recording.count; leg++) {
-      const [x, y] = recording.foot(0, leg);
-      this.half = Math.max(this.half, 1.62 * Math.abs(x - recording.q[0]), 1.62 * Math.abs(y - recording.q[1]));
-    }
+    this.fitted = false;
     new ResizeObserver(() => this.show(this.time)).observe(canvas);
   }
   show(t) {
@@ -306,6 +314,7 @@ class PlanView {
     const { canvas, rec } = this, ratio = window.devicePixelRatio || 1;
     const w = canvas.clientWidth, h = canvas.clientHeight;
     if (!w || !h || !rec.count) return;
+    if (!this.fitted) this.fit();
     if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) {
       canvas.width = Math.round(w * ratio); canvas.height = Math.round(h * ratio);
     }
@@ -329,6 +338,14 @@ class PlanView {
     g.fillStyle = colour("--muted"); g.font = "11px system-ui, sans-serif"; g.textAlign = "left";
     g.strokeStyle = g.fillStyle; g.lineWidth = 1.5; g.beginPath(); g.moveTo(12, h - 12); g.lineTo(12 + 0.1 * scale, h - 12); g.stroke();
     g.fillText("100 mm", 12, h - 18);
+  }
+  fit() {
+    const rec = this.rec;
+    for (let leg = 0; leg < 4; leg++) {
+      const [x, y] = rec.foot(0, leg);
+      this.half = Math.max(this.half, 1.62 * Math.abs(x - rec.q[0]), 1.62 * Math.abs(y - rec.q[1]));
+    }
+    this.fitted = true;
   }
   grid(g, at, w, h, scale, x0, y0, colour) {
     g.strokeStyle = colour; g.lineWidth = 1; g.beginPath();
@@ -381,18 +398,30 @@ class PlanView {
   }
 }
 
+function openView(pane, recording) {
+  try {
+    return new View3D(pane, recording);
+  } catch (error) {
+    pane.innerHTML = '<p class="no-webgl">This browser shows no 3D (WebGL is off). The view from above still works.</p>';
+    console.warn("no 3D view:", error);
+    return null;
+  }
+}
+
+function wireControls(root, view, redraw) {
+  for (const item of root.querySelectorAll("[data-camera]")) item.onclick = () => { if (view) view.preset(item.dataset.camera); };
+  for (const item of root.querySelectorAll("[data-show]")) {
+    item.onchange = () => { if (view) { view.shown[item.dataset.show] = item.checked; redraw(); } };
+  }
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (view) view.theme(); redraw(); });
+}
+
 // Ties clock, views and the controls inside `root` together. Elements are found by data-role.
 function startReplay(root, data) {
   const role = (name) => root.querySelector(`[data-role="${name}"]`);
   const recording = new Recording(data), clock = new Clock(recording.duration);
   const plan = role("plan") ? new PlanView(role("plan"), recording) : null;
-  let view = null;
-  try {
-    view = new View3D(role("view"), recording);
-  } catch (error) {
-    role("view").innerHTML = '<p class="no-webgl">This browser shows no 3D (WebGL is off). The plan view and the plots still work.</p>';
-    console.warn("no 3D view:", error);
-  }
+  const view = openView(role("view"), recording);
   const slider = role("time"), button = role("play"), label = role("clock"), state = role("state");
   slider.max = recording.duration; slider.step = 0.01;
   const degrees = (x) => (x * 180 / Math.PI).toFixed(1).replace("-", "\u2212") + "°";
@@ -411,16 +440,12 @@ function startReplay(root, data) {
   button.onclick = () => clock.toggle();
   slider.oninput = () => clock.seek(Number(slider.value));
   role("rate").onchange = (event) => { clock.rate = Number(event.target.value); };
-  for (const item of root.querySelectorAll("[data-camera]")) item.onclick = () => { if (view) view.preset(item.dataset.camera); };
-  for (const item of root.querySelectorAll("[data-show]")) {
-    item.onchange = () => { if (view) { view.shown[item.dataset.show] = item.checked; view.show(clock.time); } };
-  }
+  wireControls(root, view, () => clock.tell());
   root.addEventListener("keydown", (event) => {
     if (event.target.tagName === "SELECT") return;
     const step = { ArrowLeft: -0.1, ArrowRight: 0.1 }[event.key];
     if (event.key === " " && event.target.tagName !== "BUTTON") { clock.toggle(); event.preventDefault(); }
     if (step) { clock.seek(clock.time + step); event.preventDefault(); }
   });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (view) view.theme(); clock.tell(); });
   return { clock, view, plan, recording };
 }

@@ -1,0 +1,100 @@
+"""A recorded run looked at again: live in the browser at its own pace, or as one page with the 3D replay."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from bluefoot_mpc.exceptions import ConfigurationError, LogError
+from bluefoot_mpc.model.parameters import RobotParameters
+from bluefoot_mpc.model.robot import RobotModel
+from bluefoot_mpc.runtime.data import RunData
+from bluefoot_mpc.settings import build
+from bluefoot_mpc.viz.animation import animation_data, viewer_script
+from bluefoot_mpc.viz.live import LiveView
+from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
+from bluefoot_mpc.viz.scene import build_scene
+from bluefoot_mpc.viz.series import extract
+
+_WAIT_FOR_PAGE = 60.0  # s
+
+
+def replay(
+    log: RunData,
+    *,
+    view: bool = False,
+    html: Path | None = None,
+    announce: Callable[[str], None] | None = None,
+) -> None:
+    """Show a recorded run with the robot that its log describes.
+
+    Args:
+        log: the run.
+        view: play it in the live view, at its own pace, once a page looks on.
+        html: file to write the 3D replay to.
+        announce: told the live view's address.
+
+    Raises:
+        LogError: the log does not describe its robot.
+    """
+    robot = robot_of(log)
+    if html is not None:
+        html.write_text(replay_html(log, robot), encoding="utf-8")
+    if view:
+        live = LiveView(robot)
+        try:
+            if announce is not None and live.url:
+                announce(live.url)
+            play(log, live)
+        finally:
+            live.close()
+
+
+def replay_html(run: RunData, robot: RobotModel) -> str:
+    """The 3D replay alone as a self-contained page."""
+    legs = robot.parameters.legs
+    series = extract(run, robot.parameters.servo.stall_torque)
+    named = run.config.get("run", {})
+    return render(
+        "page.html.j2",
+        title=f"{named.get('scenario', 'run')}, seed {named.get('seed', '–')}",
+        has_truth=series.has_truth,
+        plots_follow=False,
+        run_data=embed_json(animation_data(build_scene(robot), series, legs.foot_radius)),
+        viewer_script=embed_script(viewer_script()),
+        player_script=embed_script(template_text("player.js")),
+    )
+
+
+def play(run: RunData, live: LiveView, *, speed: float = 1.0, wait: float = _WAIT_FOR_PAGE) -> None:
+    """Play a run in the live view and return when it is over or the view is gone.
+
+    Args:
+        run: the run.
+        live: where to show it.
+        speed: times its own pace.
+        wait: s to wait for the first page before starting.
+    """
+    deadline = time.monotonic() + wait
+    while live.alive and live.pages == 0 and time.monotonic() < deadline:
+        time.sleep(0.1)
+    start = time.monotonic()
+    for index, telemetry in enumerate(run.telemetry):
+        if not live.alive:
+            return
+        due = start + (telemetry.time - run.telemetry[0].time) / speed
+        time.sleep(max(0.0, due - time.monotonic()))
+        live.show(telemetry, run.truth[index] if index < len(run.truth) else None)
+
+
+def robot_of(run: RunData) -> RobotModel:
+    """The robot whose parameters a run recorded.
+
+    Raises:
+        LogError: they are missing, or do not fit this version.
+    """
+    try:
+        return RobotModel(build(RobotParameters, run.config["model"], "model"))
+    except (KeyError, ConfigurationError) as error:
+        raise LogError(f"the log does not describe its robot: {error}") from error

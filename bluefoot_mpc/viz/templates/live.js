@@ -1,0 +1,74 @@
+"use strict";
+// The same views as the replay's, on a recording that grows with every state from the server.
+(function () {
+  const CAPACITY = 20000;
+  const root = document.getElementById("live");
+  const role = (name) => root.querySelector(`[data-role="${name}"]`);
+
+  class LiveRecording extends Recording {
+    constructor(data) {
+      super({ ...data, modes: [], ground: [0, 0, 0] }, CAPACITY);
+      this.count = 0;
+    }
+    add(state) {
+      if (this.count === CAPACITY) this.forget(CAPACITY / 2);
+      const i = this.count++;
+      const missing = [NaN, NaN, NaN];
+      this.time[i] = state.time;
+      this.q.set(state.q, this.width * i);
+      this.feet.set(state.feet, 12 * i);
+      this.states[i] = state.states;
+      this.com.set(state.com || missing, 3 * i);
+      this.zmp.set([NaN, NaN], 2 * i);
+      this.zmpPlan.set(state.zmpPlan || [NaN, NaN], 2 * i);
+      this.push.set(state.push || [0, 0, 0], 3 * i);
+    }
+    forget(n) {
+      for (const key of ["time", "q", "feet", "states", "com", "zmp", "zmpPlan", "push"]) {
+        const width = this[key].length / CAPACITY;
+        this[key].copyWithin(0, width * n);
+      }
+      this.count -= n;
+    }
+  }
+
+  const recording = new LiveRecording(JSON.parse(document.getElementById("run-data").textContent));
+  const plan = new PlanView(role("plan"), recording);
+  const view = openView(role("view"), recording);
+  wireControls(root, view, () => draw());
+  let state = null, fresh = false;
+
+  function draw() {
+    if (!state) return;
+    const i = recording.count - 1, degrees = (x) => (x * 180 / Math.PI).toFixed(1).replace("-", "\u2212") + "°";
+    if (view) view.show(recording.time[i]);
+    plan.show(recording.time[i]);
+    const [roll, pitch] = recording.rollPitch(i), [forward, left, turn] = state.speed;
+    const mm = (x) => (1000 * x).toFixed(0).replace("-", "\u2212");
+    role("state").textContent = `${state.mode} · roll ${degrees(roll)} · pitch ${degrees(pitch)}`;
+    role("clock").textContent = `${state.time.toFixed(1)} s`;
+    role("command").textContent = state.mode === "walk"
+      ? `${state.gait}, ${mm(forward)} mm/s forward, ${mm(left)} mm/s left, ${degrees(turn)}/s left turn` : state.mode;
+    if (state.events.length) role("event").textContent = state.events[state.events.length - 1];
+  }
+
+  function frame() {
+    if (fresh) { fresh = false; draw(); }
+    requestAnimationFrame(frame);
+  }
+
+  function connect() {
+    const socket = new WebSocket(`ws://${location.host}/state`);
+    socket.onmessage = (message) => {
+      const next = JSON.parse(message.data);
+      if (state && next.time < state.time) recording.count = 0;  // a new run
+      state = next;
+      recording.add(state);
+      fresh = true;
+    };
+    socket.onclose = () => { role("state").textContent = "the run has ended"; setTimeout(connect, 1500); };
+  }
+
+  frame();
+  connect();
+})();
