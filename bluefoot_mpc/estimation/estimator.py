@@ -188,7 +188,7 @@ class Estimator:
         """Carry the filter to the frame's time; also gives the way that rolling feet made."""
         before = memory.filter
         motion = integrate(
-            before.quaternion, before.velocity, samples, before=memory.sample, span=span,
+            before.quaternion, before.velocity, samples, span=span,
             biases=(before.gyro_bias, before.accel_bias),
         )  # fmt: skip
         bend = (angles - memory.angles).reshape(N_LEGS, -1)[:, 1:].sum(axis=1).tolist()

@@ -18,7 +18,6 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 ZERO: Vector = (0.0, 0.0, 0.0)
-MAX_INTERVAL = 0.021  # s, samples further apart are not averaged
 
 
 class Sample(NamedTuple):
@@ -78,21 +77,20 @@ def usable_samples(batch: ImuBatch, after: float, until: float, last: Sample | N
 
 
 def integrate(
-    quaternion: Quaternion, velocity: Vector, samples: list[Sample], *, before: Sample | None,
+    quaternion: Quaternion, velocity: Vector, samples: list[Sample], *,
     span: tuple[float, float], biases: tuple[Vector, Vector],
 ) -> Motion:  # fmt: skip
     """Carry attitude and velocity of the IMU over one frame.
 
-    Each interval turns by the mean of the samples at its two ends (one end
-    alone would lag by half an interval) and accelerates by theirs, seen from
-    the middle of the turn. The last sample also fills the rest of the frame;
-    without samples the robot goes on without turning or accelerating.
+    A sample stands for the mean over the time since its predecessor, as sensors
+    that low-pass and decimate give it; forces are seen from the middle of that
+    turn. The last sample also fills the rest of the frame; without samples the
+    robot goes on without turning or accelerating.
 
     Args:
         quaternion: rotation_base_to_world at the start.
         velocity: m/s, world, at the start.
         samples: what `usable_samples` gave.
-        before: the sample used before them.
         span: s, start and end of the frame.
         biases: gyro bias (rad/s) and accelerometer bias (m/s²), base frame.
     """
@@ -104,8 +102,7 @@ def integrate(
         until = end if k + 1 == len(samples) else sample.time
         dt = until - time
         time = until
-        (wx, wy, wz), (ax, ay, az) = _interval_mean(before, sample)
-        before = sample
+        (wx, wy, wz), (ax, ay, az) = sample.rate, sample.force
         dx, dy, dz = (wx - bx) * dt, (wy - by) * dt, (wz - bz) * dt
         middle = turned(quaternion, 0.5 * dx, 0.5 * dy, 0.5 * dz)
         fx, fy, fz = rotated(middle, ax - cx, ay - cy, az - cz)
@@ -164,16 +161,6 @@ def rotation_matrix(quaternion: Quaternion) -> FloatArray:
             (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
         )
     )
-
-
-def _interval_mean(start: Sample | None, end: Sample) -> tuple[Vector, Vector]:
-    """Mean rate and force between two samples; the later one alone across a gap."""
-    if start is None or end.time - start.time > MAX_INTERVAL:
-        return end.rate, end.force
-    (ux, uy, uz), (fx, fy, fz) = start.rate, start.force
-    (wx, wy, wz), (ax, ay, az) = end.rate, end.force
-    rate = (0.5 * (ux + wx), 0.5 * (uy + wy), 0.5 * (uz + wz))
-    return rate, (0.5 * (fx + ax), 0.5 * (fy + ay), 0.5 * (fz + az))
 
 
 def level_quaternion(samples: list[Sample]) -> Quaternion:

@@ -115,8 +115,7 @@ def make_run(motion: Motion, sensors: Sensors, seed: int) -> Run:
     p, e = CubicSpline(t, position), CubicSpline(t, rpy)
     rotation = rotations(rpy)
     rate = _body_rate(rpy, e(t, 1))
-    sensor_path = CubicSpline(t, position + rotation @ MOUNT)
-    force = np.einsum("nji,nj->ni", rotation, sensor_path(t, 2) + np.array([0.0, 0.0, GRAVITY]))
+    force = _mean_force(CubicSpline(t, position + rotation @ MOUNT)(t, 1), e, t)
     feet, stance = _feet(motion, t, velocity, rpy[:, 2], rng=rng, slip=sensors.slip)
     joints, feet = _joints(motion, geo, t, position, rotation=rotation, feet=feet, stance=stance)
     truth = Run(
@@ -153,6 +152,22 @@ def _body_rate(rpy: FloatArray, change: FloatArray) -> FloatArray:
             -np.sin(roll) * dp + np.cos(roll) * np.cos(pitch) * dy,
         ]
     )
+
+
+def _mean_force(velocity: FloatArray, rpy: CubicSpline, t: FloatArray) -> FloatArray:
+    """(n, 3) specific force, mean over the IMU's period before each time, base frame in its middle."""
+    k = round(IMU_PERIOD / 0.001)
+    change = (velocity - np.vstack([np.repeat(velocity[:1], k, axis=0), velocity[:-k]])) / IMU_PERIOD
+    middle = rotations(rpy(t - 0.5 * IMU_PERIOD))
+    return np.einsum("nji,nj->ni", middle, change + np.array([0.0, 0.0, GRAVITY]))
+
+
+def _mean_rate(rate: FloatArray) -> FloatArray:
+    """(n, 3) rad/s, mean over the IMU's period before each time (trapezoid on the grid)."""
+    k = round(IMU_PERIOD / 0.001)
+    total = np.vstack([np.zeros(3), np.cumsum(0.5 * (rate[1:] + rate[:-1]), axis=0)])
+    before = np.vstack([np.repeat(total[:1], k, axis=0), total[:-k]])
+    return (total - before) / k
 
 
 def _feet(
@@ -235,7 +250,7 @@ def _frames(truth: Run, force: FloatArray, sensors: Sensors, rng: np.random.Gene
     gyro_bias = rng.uniform(-1, 1, 3) * sensors.gyro_bias
     accel_bias = rng.uniform(-1, 1, 3) * sensors.accel_bias
     iron = rng.uniform(-1, 1, 3) * sensors.hard_iron
-    rotation = rotations(truth.rpy)
+    rotation, rate = rotations(truth.rpy), _mean_rate(truth.rate)
     closed = np.zeros(4, dtype=bool)
     k_frame, k_imu = round(FRAME_PERIOD / 0.001), round(IMU_PERIOD / 0.001)
     picks = np.arange(k_frame, len(t) - k_frame, k_frame)
@@ -252,7 +267,7 @@ def _frames(truth: Run, force: FloatArray, sensors: Sensors, rng: np.random.Gene
         closed = wanted.copy()
         angles = truth.joints[k]
         batch = ImuBatch(
-            time=t[rows], gyro=truth.rate[rows] + bias + rng.normal(0, sensors.gyro_noise, (n, 3)),
+            time=t[rows], gyro=rate[rows] + bias + rng.normal(0, sensors.gyro_noise, (n, 3)),
             accel=force[rows] + accel_bias + rng.normal(0, sensors.accel_noise, (n, 3)),
             magnetometer=magnetometer, valid=np.ones(n, dtype=bool),
         )  # fmt: skip

@@ -66,7 +66,7 @@ def error_of(estimate: FilterState, truth: FilterState) -> np.ndarray:
 
 def carried(state: FilterState, samples: list[Sample]) -> FilterState:
     motion = integrate(
-        state.quaternion, state.velocity, samples, before=None, span=(0.0, DT),
+        state.quaternion, state.velocity, samples, span=(0.0, DT),
         biases=(state.gyro_bias, state.accel_bias),
     )  # fmt: skip
     return state._replace(
@@ -215,7 +215,7 @@ def test_prediction_keeps_the_covariance_symmetric_and_grows_it():
     state = initial_state((0.0, 0.0, 0.0, 1.0), 0.05, CONFIG)
     sample = Sample(0.005, (0.0, 0.0, 0.1), (0.0, 0.0, GRAVITY))
     motion = integrate(
-        state.quaternion, state.velocity, [sample], before=None, span=(0.0, DT),
+        state.quaternion, state.velocity, [sample], span=(0.0, DT),
         biases=(state.gyro_bias, state.accel_bias),
     )  # fmt: skip
     after = predict(state, motion, np.zeros((4, 3)), Noise(1e-4, (1e-2, 1e-2)), dt=DT, config=CONFIG)
