@@ -224,7 +224,7 @@ def _gait_figures(cut: Window) -> dict[str, Any]:
     if cycle is not None:
         figures["cycle_s"] = cycle
         figures["duty_factor"] = np.mean(~cut.swing)
-        figures["lift_off_lags"] = metrics.lift_off_lags(cut.time, cut.swing)
+        figures["lift_off_lags"] = metrics.lift_off_lags(cut.time, cut.y2)
         figures["footfall_order"] = " ".join(metrics.footfall_order(cut.time, cut.swing)) or None
     return figures
 

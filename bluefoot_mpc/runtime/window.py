@@ -63,6 +63,7 @@ class Window:
         foot_position: (n, 4, 3) m, in world.
         foot_height: (n, 4) m, above the ground under the foot.
         swing: (n, 4) scheduled swing.
+        y2: (n, 4) second oscillator states, positive in swing.
         planned_zmp: (n, 2) m, in b'; NaN without one.
         reference_foot: (n, 4, 3) m, wanted feet in b'.
         reference_swing: (n, 4) True where those swing.
@@ -80,6 +81,7 @@ class Window:
     foot_position: FloatArray
     foot_height: FloatArray
     swing: BoolArray
+    y2: FloatArray
     planned_zmp: FloatArray
     reference_foot: FloatArray
     reference_swing: BoolArray
@@ -117,6 +119,7 @@ def cut_window(run: RunData, start: float, end: float) -> Window | None:
         foot_position=_stack(samples, lambda s: s.foot_position),
         foot_height=_stack(samples, lambda s: s.foot_height),
         swing=np.array([t.phase.swing for t in telemetry], dtype=np.bool_),
+        y2=np.array([t.phase.y2 for t in telemetry]),
         planned_zmp=_stack(telemetry, lambda t: t.zmp),
         reference_foot=_stack(telemetry, lambda t: t.reference.foot_position),
         reference_swing=np.array([t.reference.swing for t in telemetry], dtype=np.bool_),

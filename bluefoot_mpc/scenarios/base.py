@@ -47,6 +47,8 @@ class Scenario(ABC):
     name: ClassVar[str]
     Config: ClassVar[type[ScenarioConfig]] = ScenarioConfig
 
+    config: Any
+
     def __init__(self, config: Any = None) -> None:
         self.config = config if config is not None else self.Config()
 
@@ -65,6 +67,10 @@ class Scenario(ABC):
     def source(self, time: float) -> MotionCommand | None:
         """The command, or None when the scenario is over."""
         return None if time >= self.config.duration else self.command(time)
+
+    def window(self) -> tuple[float, float] | None:
+        """Start and end (s) of what is measured; None: from 2 s after the last change of command."""
+        return None
 
     @classmethod
     def describe(cls) -> str:

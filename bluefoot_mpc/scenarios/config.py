@@ -96,9 +96,9 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
 
 
 def _without_run(table: dict[str, Any]) -> dict[str, Any]:
-    # A resolved config.toml of an earlier run may be given back; what is run
-    # comes from the command line.
-    return {key: value for key, value in table.items() if key != "run"}
+    # The config.toml of an earlier run may be given back: what is run comes from
+    # the command line, and what was drawn follows from the seed.
+    return {key: value for key, value in table.items() if key not in ("run", "drawn")}
 
 
 def _parameters(table: dict[str, Any], options: RunOptions) -> RobotParameters:

@@ -85,6 +85,10 @@ class Pose(Scenario):
         offset *= config.amplitudes()
         return MotionCommand(trunk=TrunkPose(position=offset[:3], rpy=offset[3:]))
 
+    def window(self) -> tuple[float, float]:
+        """The whole motion: the command never rests."""
+        return self.config.stand_time, self.config.duration
+
     def criteria(self, summary: Mapping[str, Any]) -> list[Criterion]:
         """On its feet, the trunk where it was commanded."""
         return [

@@ -77,6 +77,24 @@ def run(name_or_path: str = "walk", options: RunOptions | None = None) -> RunRes
     return run_commanded(resolved.scenario.source, resolved, options)
 
 
+def simulate(name_or_path: str, options: RunOptions) -> RunResult:
+    """Run a scenario in memory, as fast as it goes, and write nothing.
+
+    Args:
+        name_or_path: a scenario's name, or the path of a script that defines one.
+        options: choices of the user; ``out``, ``view`` and ``report`` have no effect.
+
+    Raises:
+        ConfigurationError: an option, file or value is impossible.
+    """
+    resolved = resolve(find_scenario(name_or_path), options)
+    model = RobotModel(resolved.parameters)
+    simulator = SimRobot(model, resolved.stages.sim, resolved.run.seed)
+    table = {**resolved.table(), "drawn": simulator.drawn}
+    data = _drive(simulator, model, resolved, resolved.scenario.source, LoopHooks(truth=simulator.truth), table)
+    return _judge(data, resolved, model, Path())
+
+
 def run_commanded(source: CommandSource, resolved: Resolved, options: RunOptions) -> RunResult:
     """Run with any source of commands: a scenario's, or a person at the keyboard.
 
@@ -86,26 +104,48 @@ def run_commanded(source: CommandSource, resolved: Resolved, options: RunOptions
         options: output folder, view and report.
     """
     model = RobotModel(resolved.parameters)
-    table = resolved.table()
+    simulator = SimRobot(model, resolved.stages.sim, resolved.run.seed)
+    table = {**resolved.table(), "drawn": simulator.drawn}
     folder = _make_folder(options, resolved.run.scenario)
     (folder / "config.toml").write_text(dump_toml(table), encoding="utf-8")
-    simulator = SimRobot(model, resolved.stages.sim, resolved.run.seed)
     view = LiveView(model) if options.view else None
+    robot = simulator if view is None else PacedRobot(simulator)
     progress = Progress(resolved.scenario.config.duration)
     observers: list[Observer] = [lambda frame, output, truth: progress.update(frame.time)]
     if view is not None:
         observers.append(view.update)
     try:
-        robot = supervise(PacedRobot(simulator) if view is not None else simulator, model, resolved)
-        pipeline = Pipeline(model, resolved.stages.control, simulator.period)
-        with Recorder(folder / "log.mcap", table) as recorder, progress:
+        with Recorder(folder / "log.mcap", table, simulator.period) as recorder, progress:
             hooks = LoopHooks(recorder=recorder, truth=simulator.truth, observers=tuple(observers))
-            data = run_loop(robot, pipeline, source, hooks, table)
+            data = _drive(robot, model, resolved, source, hooks, table)
+            recorder.finish(data.stop_reason, data.real_time_factor)
     finally:
-        simulator.close()
         if view is not None:
             view.close()
-    return _conclude(data, resolved, model, folder, options)
+    result = _judge(data, resolved, model, folder)
+    text = orjson.dumps(result.summary, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY)
+    (folder / "summary.json").write_bytes(text + b"\n")
+    if options.report:
+        checks = [dataclasses.asdict(criterion) for criterion in result.criteria]
+        write_report(data, result.summary, model, folder / "report.html", checks)
+    return result
+
+
+def _drive(
+    robot: Robot,
+    model: RobotModel,
+    resolved: Resolved,
+    source: CommandSource,
+    hooks: LoopHooks,
+    table: dict[str, Any],
+) -> RunData:
+    """The loop itself; the robot is closed whatever happens."""
+    try:
+        supervised = supervise(robot, model, resolved)
+        pipeline = Pipeline(model, resolved.stages.control, robot.period)
+        return run_loop(supervised, pipeline, source, hooks, table)
+    finally:
+        robot.close()
 
 
 def supervise(robot: Robot, model: RobotModel, resolved: Resolved) -> SafetySupervisor:
@@ -127,17 +167,10 @@ def pipeline_from_log(data: RunData) -> Pipeline:
     return Pipeline(RobotModel(parameters), control, data.period)
 
 
-def _conclude(
-    data: RunData, resolved: Resolved, model: RobotModel, folder: Path, options: RunOptions
-) -> RunResult:
-    summary = summarize(data, model)
+def _judge(data: RunData, resolved: Resolved, model: RobotModel, folder: Path) -> RunResult:
+    summary = summarize(data, model, window=resolved.scenario.window())
     criteria = resolved.scenario.criteria(summary)
     summary["success"] = success = all(criterion.holds for criterion in criteria)
-    text = orjson.dumps(summary, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY)
-    (folder / "summary.json").write_bytes(text + b"\n")
-    if options.report:
-        checks = [dataclasses.asdict(criterion) for criterion in criteria]
-        write_report(data, summary, model, folder / "report.html", checks)
     return RunResult(summary=summary, folder=folder, criteria=criteria, success=success, data=data)
 
 

@@ -142,6 +142,10 @@ class Transition(Scenario):
         gait = "walk" if 1.0 / 3.0 <= share < 2.0 / 3.0 else "trot"
         return replace(motion(config), gait=gait)
 
+    def window(self) -> tuple[float, float]:
+        """All of the walking, both changes of gait included."""
+        return self.config.stand_time + 2.0, self.config.duration
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class PushScenarioConfig(WalkConfig):

@@ -57,7 +57,7 @@ def lump(parameters: RobotParameters) -> MassPoints:
     joint, link, foot = np.zeros(4), np.zeros(4), 0.0
     trunk_parts = [part for part in parameters.parts if part.body == "trunk"]
     trunk = sum(part.mass for part in trunk_parts)
-    trunk_com = sum(part.mass * np.array(part.position) for part in trunk_parts) / trunk
+    trunk_com = np.array([part.mass * np.array(part.position) for part in trunk_parts]).sum(axis=0) / trunk
     for part in parameters.parts:
         if part.body == "trunk":
             continue

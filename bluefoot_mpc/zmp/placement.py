@@ -49,7 +49,7 @@ def centre_of_mass(masses: MassPoints, trunk_com: FloatArray, leg_points: FloatA
         leg_points: (4, 5, 3) m, four joints and the foot of each leg, same frame.
     """
     legs = masses.leg_weights @ leg_points.sum(axis=0)
-    return (masses.trunk * trunk_com + legs) / masses.total
+    return np.asarray((masses.trunk * trunk_com + legs) / masses.total)
 
 
 def static_zmp(
