@@ -57,7 +57,7 @@ class SimulationArguments(Common):
     payload: Annotated[str | None, tyro.conf.arg(metavar="KG,X,Y,Z", help_behavior_hint="")] = None
     """Mass on the trunk and its place in the trunk's frame, kg and m."""
     gait: Annotated[str | None, tyro.conf.arg(metavar="{trot,walk}", help_behavior_hint="")] = None
-    """Gait."""
+    """Gait to walk with."""
 
     def run_fields(self) -> dict[str, Any]:
         """Arguments by the names that RunOptions gives them."""

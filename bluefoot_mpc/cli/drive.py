@@ -105,14 +105,17 @@ class AboveStatus(io.TextIOBase):
 
     def __init__(self, screen: TextIO) -> None:
         self._screen = screen
+        self._line = ""
 
     def isatty(self) -> bool:
         """No: bars and colours stay out of the way of the status line."""
         return False
 
     def write(self, text: str) -> int:
-        """Write a message over the status line, which is drawn again below."""
-        self._screen.write(f"\r\x1b[K{text}")
+        """Write whole lines over the status line, which is drawn again below; keep the rest."""
+        *lines, self._line = (self._line + text).split("\n")
+        for line in lines:
+            self._screen.write(f"\r\x1b[K{line}\n")
         return len(text)
 
     def flush(self) -> None:

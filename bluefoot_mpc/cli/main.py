@@ -6,17 +6,14 @@ import contextlib
 import importlib
 import os
 import sys
-import tempfile
-import time
-import traceback
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
 from typing import cast
 
 from rich.console import Console
 from rich.text import Text
 
 from bluefoot_mpc.cli import arguments
+from bluefoot_mpc.cli.messages import keep_traceback, messages_on_stderr
 from bluefoot_mpc.cli.outcome import FAILED, INTERRUPTED, Outcome, to_json
 from bluefoot_mpc.cli.parse import parse
 from bluefoot_mpc.exceptions import BlueFootError
@@ -34,12 +31,20 @@ _EXECUTE: dict[type, str] = {
 """Command to the function that runs it; imported late, so that ``--help`` is quick."""
 
 
+class _Page(Console):
+    """Standard output; a reader that goes away is left to the caller, not turned into exit status 1."""
+
+    def on_broken_pipe(self) -> None:
+        """Raise again."""
+        raise BrokenPipeError
+
+
 def main(argv: Sequence[str] | None = None, prog: str = "bluefoot") -> int:
     """Run one command line and return its exit status (0, 1, 2, 3 or 130; see the help)."""
     words = list(sys.argv[1:] if argv is None else argv)
     as_json, debug = "--json" in words, "--debug" in words
     try:
-        with _only_json() if as_json else contextlib.nullcontext():
+        with messages_on_stderr(debug), _only_json() if as_json else contextlib.nullcontext():
             outcome = _execute(words, prog)
     except SystemExit as stop:  # --help
         return int(stop.code or 0)
@@ -51,7 +56,7 @@ def main(argv: Sequence[str] | None = None, prog: str = "bluefoot") -> int:
         # The one place that catches everything: a user gets a sentence, the file gets the traceback.
         if debug:
             raise
-        evidence = f"the traceback is in {_keep_traceback()} (--debug shows it)"
+        evidence = f"the traceback is in {keep_traceback(error)} (--debug shows it)"
         message = f"unexpected {type(error).__name__}: {error}"
         return _fail(message, FAILED, as_json, (*notes(error), evidence))
     return _show(outcome, as_json)
@@ -74,7 +79,7 @@ def _show(outcome: Outcome, as_json: bool) -> int:
         if as_json:
             print(to_json(outcome.data), flush=True)
         else:
-            console = Console(highlight=False)
+            console = _Page(highlight=False)
             for part in outcome.page:
                 # Lines of text stay whole: a path or a URDF that was wrapped is of no use.
                 console.print(part, soft_wrap=isinstance(part, (str, Text)), markup=False)
@@ -92,13 +97,6 @@ def _fail(message: str, status: int, as_json: bool, remarks: Sequence[str] = ())
     if as_json:
         print(to_json({"error": text, "exit_status": status}), flush=True)
     return status
-
-
-def _keep_traceback() -> Path:
-    name = f"bluefoot-error-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.txt"
-    path = Path(tempfile.gettempdir()) / name
-    path.write_text(traceback.format_exc(), encoding="utf-8")
-    return path
 
 
 @contextlib.contextmanager

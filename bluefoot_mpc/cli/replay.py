@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+import sys
 from typing import Any
 
 from bluefoot_mpc.cli.arguments import ReplayCommand
 from bluefoot_mpc.cli.outcome import FAILED, OK, Outcome
+from bluefoot_mpc.exceptions import ConfigurationError, LogError
 from bluefoot_mpc.runtime.log import RunLog, read_log
 from bluefoot_mpc.runtime.replay import RethinkReport, Step, rethink
 from bluefoot_mpc.scenarios import pipeline_from_log
 from bluefoot_mpc.types import JointCommand, MotionCommand, SafetyRequest, SensorFrame
+from bluefoot_mpc.viz.replay import replay as show_replay
 
 
 def replay(command: ReplayCommand) -> Outcome:
@@ -25,7 +27,25 @@ def replay(command: ReplayCommand) -> Outcome:
         status = OK if report.equal else FAILED
         data["rethink"] = _as_data(report)
         lines.append(str(report))
+    if command.html is not None or command.view:
+        _show(command, log)
+    if command.html is not None:
+        data["html"] = command.html
+        lines.append(f"wrote {command.html}")
     return Outcome(status=status, data=data, page=tuple(lines))
+
+
+def _show(command: ReplayCommand, log: RunLog) -> None:
+    if not log.telemetry:
+        raise LogError(f"{log.path} holds nothing to show: not one tick of the controller is readable")
+    try:
+        show_replay(log, view=command.view, html=command.html, announce=_announce)
+    except OSError as error:
+        raise ConfigurationError(f"cannot write {command.html}: {error.strerror or error}") from error
+
+
+def _announce(address: str) -> None:
+    print(f"live view: {address}", file=sys.stderr, flush=True)
 
 
 def describe(log: RunLog) -> dict[str, Any]:
