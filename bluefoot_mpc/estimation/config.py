@@ -15,8 +15,8 @@ class ImuConfig:
     gyro_noise: float = 0.01  # rad/s, white, of one sample
     gyro_bias: float = 0.0115  # rad/s, deviation of a uniform ±0.02
     gyro_drift: float = 1.3e-4  # rad/s per root second: 0.001 in a minute
-    accel_noise: float = 0.2  # m/s², white; twice the data sheet's for the shaking of footfalls
-    shake: float = 1.0  # share of the force's spread within a frame that counts as noise
+    accel_noise: float = 0.15  # m/s², white, of one sample; the data sheet's and a half
+    shake: float = 0.1  # share of the force's spread within a frame that counts as noise
     accel_bias: float = 0.0173  # m/s², deviation of a uniform ±0.03
     accel_drift: float = 1e-4  # m/s² per root second
     lost_after: float = 0.1  # s without a usable sample until the estimate is not healthy
@@ -39,10 +39,10 @@ class ContactConfig:
 
     debounce: float = 0.03  # s, edges back within this time are chatter
     probation: int = 1  # frames a foot must stand still before it counts
-    joint_noise: float = 0.0017  # rad, deviation of one step's rounding and some play
-    foot_noise: float = 0.0005  # m, of a foot point beyond the joints' share
-    slip: float = 0.004  # m per root second, wander of a standing foot
-    gate: float = 16.0  # squared deviations (3 axes) beyond which a foot slips or lifts
+    joint_noise: float = 0.0015  # rad, deviation of the rounding to one step
+    foot_noise: float = 0.0003  # m, of a foot point beyond the joints' share
+    slip: float = 0.0015  # m per root second, wander of a standing foot
+    gate: float = 9.0  # squared deviations (3 axes) beyond which a foot slips or lifts
     blind_after: float = 0.2  # s without a standing foot until rest is assumed
     blind_speed: float = 0.5  # m/s, deviation of that assumption
 
