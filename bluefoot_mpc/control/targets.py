@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from bluefoot_mpc.geometry import rotation_from_rpy
-from bluefoot_mpc.model.legs import LegGeometry, inverse
-from bluefoot_mpc.model.legs.ankle import AnkleConfig, ankle_directions
+from bluefoot_mpc.model.legs import AnkleConfig, AnkleTable, LegGeometry, ankle_directions, inverse
 from bluefoot_mpc.types import FloatArray, PostureReference
 
 START_TIME = 1.0
@@ -26,6 +25,7 @@ class JointTargets:
     def __init__(self, geometry: LegGeometry, ankle: AnkleConfig) -> None:
         self._geometry = geometry
         self._ankle = ankle
+        self._table = AnkleTable(geometry) if ankle.policy == "margin" else None
         self.reset()
 
     def reset(self) -> None:
@@ -45,7 +45,7 @@ class JointTargets:
         """
         rotation = rotation_from_rpy(reference.trunk_rpy)
         feet = (reference.foot_position - reference.trunk_position) @ rotation
-        gamma = ankle_directions(self._geometry, self._ankle, feet, rotation[2])
+        gamma = ankle_directions(self._geometry, self._ankle, feet, rotation[2], table=self._table)
         result = inverse(self._geometry, feet, gamma)
         goal = np.clip(result.joints, self._geometry.lower, self._geometry.upper)
         events = tuple(violation.describe() for violation in result.violations)

@@ -5,6 +5,7 @@ from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.geometry import rotation_from_rpy
 from bluefoot_mpc.model.legs import (
     AnkleConfig,
+    AnkleTable,
     LegGeometry,
     ankle_directions,
     feet_in_base,
@@ -43,7 +44,9 @@ def test_every_policy_leaves_the_feet_where_they_are_wanted(policy):
 
 def test_fixed_policy_ignores_the_trunk():
     up = rotation_from_rpy(np.array([0.3, -0.2, 1.0]))[2]
-    directions = ankle_directions(BLUEFOOT, AnkleConfig(direction_deg=-105.0), STANCE_FEET, up)
+    directions = ankle_directions(
+        BLUEFOOT, AnkleConfig(policy="fixed", direction_deg=-105.0), STANCE_FEET, up
+    )
     np.testing.assert_allclose(np.degrees(directions), -105.0)
 
 
@@ -125,6 +128,49 @@ def test_margin_policy_points_at_a_foot_out_of_reach():
     assert (widest_margin(BLUEFOOT, feet) == -np.inf).all()
     angles, _ = inverse_in_leg(BLUEFOOT, feet, directions)
     np.testing.assert_allclose(angles[:, 2:], 0.0, atol=1e-7)
+
+
+def _reachable_feet(geometry, rng, count):
+    """(count, 4, 3) feet below the hips, in the workspace of walking and falling."""
+    length = sum(geometry.links[1:])
+    reach = geometry.links[0] + length * rng.uniform(0.0, 0.72, (count, 4))
+    azimuth = geometry.hip_azimuth + rng.uniform(-0.8, 0.8, (count, 4))
+    height = length * rng.uniform(-0.85, -0.2, (count, 4))
+    return geometry.hip_position + np.stack(
+        [reach * np.cos(azimuth), reach * np.sin(azimuth), height], axis=-1
+    )
+
+
+@pytest.mark.parametrize("geometry", [BLUEFOOT, uneven_geometry()], ids=["bluefoot", "uneven"])
+def test_table_gives_the_widest_directions(geometry):
+    table = AnkleTable(geometry)
+    feet = _reachable_feet(geometry, np.random.default_rng(5), 1500)
+    exact = widest_directions(geometry, to_leg_frame(geometry, feet), zooms=3)
+    error = np.array([table.directions(points) for points in feet]) - exact
+    error = np.degrees(np.abs((error + np.pi) % (2.0 * np.pi) - np.pi))
+    assert error.max() < 0.5
+    assert np.median(error) < 0.02  # most of the workspace is smooth
+
+
+def test_table_searches_where_it_cannot_look_up():
+    table = AnkleTable(BLUEFOOT)
+    for feet in (
+        np.tile([0.4, 0.1, -0.3], (4, 1)),  # out of reach
+        STANCE_FEET + np.array([0.0, 0.0, 0.2]),  # above the hips
+        BLUEFOOT.hip_position,  # behind the hip_pitch axes
+    ):
+        exact = widest_directions(BLUEFOOT, to_leg_frame(BLUEFOOT, feet))
+        np.testing.assert_array_equal(table.directions(feet), exact)
+
+
+def test_table_answers_for_the_legs_that_are_asked_for():
+    geometry = uneven_geometry()
+    config, table = AnkleConfig(policy="margin"), AnkleTable(geometry)
+    feet = _reachable_feet(geometry, np.random.default_rng(6), 1)[0]
+    every = ankle_directions(geometry, config, feet, table=table)
+    some = ankle_directions(geometry, config, feet[[3, 1]], legs=(3, 1), table=table)
+    np.testing.assert_array_equal(some, every[[3, 1]])
+    np.testing.assert_allclose(every, ankle_directions(geometry, config, feet), atol=np.radians(0.5))
 
 
 def test_policies_come_from_a_table_and_wrong_ones_name_the_valid_ones():

@@ -1,14 +1,7 @@
 """Kinematics of the legs: positions, Jacobians, inverse, ankle direction and velocities."""
 
-from bluefoot_mpc.model.legs.ankle import (
-    AnkleConfig,
-    AnklePolicy,
-    ankle_directions,
-    ground_directions,
-    limit_margin,
-    widest_directions,
-    widest_margin,
-)
+from bluefoot_mpc.model.legs.ankle import AnkleConfig, AnklePolicy, ankle_directions, ground_directions
+from bluefoot_mpc.model.legs.ankle_table import AnkleTable
 from bluefoot_mpc.model.legs.forward import (
     feet_in_base,
     foot_jacobians_in_base,
@@ -26,11 +19,13 @@ from bluefoot_mpc.model.legs.inverse import (
     limit_violations,
 )
 from bluefoot_mpc.model.legs.velocity import damped_inverse, foot_velocities_in_world, joint_velocities
+from bluefoot_mpc.model.legs.widest import limit_margin, widest_directions, widest_margin
 
 __all__ = [
     "ALL_LEGS",
     "AnkleConfig",
     "AnklePolicy",
+    "AnkleTable",
     "IkResult",
     "LegGeometry",
     "LimitViolation",

@@ -13,20 +13,14 @@ from typing import Literal
 
 import numpy as np
 
+from bluefoot_mpc.model.legs.ankle_table import AnkleTable
 from bluefoot_mpc.model.legs.forward import to_leg_frame
 from bluefoot_mpc.model.legs.geometry import ALL_LEGS, LegGeometry
-from bluefoot_mpc.model.legs.inverse import REACH_TOLERANCE, inverse_in_leg
+from bluefoot_mpc.model.legs.widest import widest_directions
 from bluefoot_mpc.settings import require_range
 from bluefoot_mpc.types import FloatArray
 
 AnklePolicy = Literal["fixed", "ground", "margin"]
-
-# One scan over all reachable directions, fine enough to find the right hill, then
-# zooms of two old steps each: two leave 0.03° (a servo step is 0.29°).
-SCAN_POINTS = 33
-ZOOMS = 2
-_REACH_ROUNDING = 1e-9  # of the knee's cosine
-_OFFSETS = 0.5 * np.pi * np.linspace(-1.0, 1.0, SCAN_POINTS)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -35,10 +29,11 @@ class AnkleConfig:
 
     ``fixed`` keeps `direction_deg` in the trunk's axes. ``ground`` turns it
     with the trunk's tilt, so that the foot keeps its attitude to the ground.
-    ``margin`` takes the direction that keeps the leg farthest from its limits.
+    ``margin`` takes the direction that keeps the leg farthest from its limits,
+    which leaves the longest strides and walks best.
     """
 
-    policy: AnklePolicy = "fixed"
+    policy: AnklePolicy = "margin"
     direction_deg: float = -99.0  # degrees, for a level trunk; unused by "margin"
 
     def __post_init__(self) -> None:
@@ -51,6 +46,8 @@ def ankle_directions(
     feet_in_base: FloatArray,
     up_in_base: FloatArray | None = None,
     legs: Sequence[int] = ALL_LEGS,
+    *,
+    table: AnkleTable | None = None,
 ) -> FloatArray:
     """Directions of the last links under the configured policy.
 
@@ -62,12 +59,15 @@ def ankle_directions(
             the last row of rotation_base_to_world. Needed by ``ground`` only;
             without it the trunk counts as level.
         legs: indices of the n legs.
+        table: where ``margin`` looks directions up instead of searching for them.
 
     Returns:
         (n,) rad.
     """
     direction = math.radians(config.direction_deg)
     if config.policy == "margin":
+        if table is not None:
+            return table.directions(feet_in_base, legs)
         return widest_directions(geometry, to_leg_frame(geometry, feet_in_base, legs), legs)
     if config.policy == "ground" and up_in_base is not None:
         return ground_directions(geometry, direction, feet_in_base, up_in_base, legs)
@@ -103,135 +103,3 @@ def ground_directions(
         outward = up_x * math.cos(azimuth) + up_y * math.sin(azimuth)
         values.append(direction - math.atan2(outward, up_z))
     return np.array(values)
-
-
-def widest_directions(
-    geometry: LegGeometry,
-    feet_in_leg: FloatArray,
-    legs: Sequence[int] = ALL_LEGS,
-    knee_up: bool = True,
-    zooms: int = ZOOMS,
-) -> FloatArray:
-    """Directions that keep hip_pitch, knee and ankle farthest from their imposed limits.
-
-    A scan over the reachable directions, then zooms around the best of them.
-    For feet below the hips the result is a continuous function of the foot
-    point (its slope jumps where another joint becomes the closest one). On the
-    knee-down branch, where hills stand at both stretched ends, the scan may
-    settle on one that is some degrees lower. A foot out of reach is pointed at.
-
-    Args:
-        geometry: lengths and limits.
-        feet_in_leg: (..., n, 3) m, foot points in the leg frames.
-        legs: indices of the n legs.
-        knee_up: branch of the knee.
-        zooms: refinements after the scan, each 16 times finer.
-
-    Returns:
-        (..., n) rad.
-    """
-    bearing, distance = _bearing_of_feet(geometry, feet_in_leg)
-    ranges = (bearing, *_ranges(geometry, legs))
-    # Turns are width * sin(place): at the ends the knee is stretched and its angle grows
-    # with the square root of the turn, which this spacing makes smooth again.
-    width = _reachable_width(geometry, distance)
-    places = np.broadcast_to(_OFFSETS, (*distance.shape, SCAN_POINTS))
-    narrowing = 1.0
-    for zoom in range(zooms + 1):
-        turns = width[..., None] * np.sin(places)
-        best = _score(geometry.links, distance, turns, ranges, knee_up).argmax(axis=-1)[..., None]
-        if zoom < zooms:
-            narrowing *= 2.0 / (SCAN_POINTS - 1)
-            places = np.take_along_axis(places, best, axis=-1) + narrowing * _OFFSETS
-    turn = np.take_along_axis(turns, best, axis=-1)[..., 0]
-    return np.asarray(np.pi - (np.pi - bearing - turn) % (2.0 * np.pi))
-
-
-def widest_margin(
-    geometry: LegGeometry,
-    feet_in_leg: FloatArray,
-    legs: Sequence[int] = ALL_LEGS,
-    knee_up: bool = True,
-    zooms: int = ZOOMS,
-) -> FloatArray:
-    """The margin that `widest_directions` leaves: (..., n) rad, as `limit_margin` counts it."""
-    directions = widest_directions(geometry, feet_in_leg, legs, knee_up, zooms)
-    return limit_margin(geometry, feet_in_leg, directions, legs, knee_up)
-
-
-def limit_margin(
-    geometry: LegGeometry,
-    feet_in_leg: FloatArray,
-    ankle: FloatArray,
-    legs: Sequence[int] = ALL_LEGS,
-    knee_up: bool = True,
-) -> FloatArray:
-    """Least distance of a leg's joints, hip_yaw included, to their limits for given ankle directions.
-
-    Args:
-        geometry: lengths and limits.
-        feet_in_leg: (..., n, 3) m, foot points in the leg frames.
-        ankle: (..., n) rad, directions of the last links.
-        legs: indices of the n legs.
-        knee_up: branch of the knee.
-
-    Returns:
-        (..., n) rad, negative where a limit is passed, -inf where out of reach.
-    """
-    angles, missing = inverse_in_leg(geometry, feet_in_leg, ankle, knee_up)
-    index = list(legs)
-    lower, upper = geometry.lower.reshape(-1, 4)[index], geometry.upper.reshape(-1, 4)[index]
-    margin = np.minimum(angles - lower, upper - angles).min(axis=-1)
-    return np.asarray(np.where(missing > REACH_TOLERANCE, -np.inf, margin))
-
-
-def _ranges(geometry: LegGeometry, legs: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    """Middles and half widths of the imposed ranges of hip_pitch, knee, ankle: (3, n, 1) rad each."""
-    index = list(legs)
-    lower = geometry.lower.reshape(-1, 4)[index, 1:].T[..., None]
-    upper = geometry.upper.reshape(-1, 4)[index, 1:].T[..., None]
-    return 0.5 * (lower + upper), 0.5 * (upper - lower)
-
-
-def _bearing_of_feet(geometry: LegGeometry, feet_in_leg: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(...) direction (rad) and distance (m) of the feet from the hip_pitch axes, in the legs' planes."""
-    reach = np.hypot(feet_in_leg[..., 0], feet_in_leg[..., 1]) - geometry.links[0]
-    height = feet_in_leg[..., 2]
-    return np.arctan2(height, reach), np.maximum(np.hypot(reach, height), 1e-9)
-
-
-def _reachable_width(geometry: LegGeometry, distance: FloatArray) -> FloatArray:
-    """(...) rad, how far the last link may turn from the foot's bearing with the ankle still in reach."""
-    _, a2, a3, a4 = geometry.links
-    cosine = (distance**2 + a4**2 - (a2 + a3) ** 2) / (2.0 * distance * a4)
-    return np.asarray(np.arccos(np.minimum(np.maximum(cosine, -1.0), 1.0)))
-
-
-def _score(
-    links: tuple[float, float, float, float],
-    distance: FloatArray,
-    turn: FloatArray,
-    ranges: tuple[FloatArray, FloatArray, FloatArray],
-    knee_up: bool,
-) -> FloatArray:
-    """Margin for last links turned by `turn` from the bearing; far below any margin out of reach.
-
-    Written out again, in axes along the bearing, because `inverse_in_leg` is
-    three times slower: it wraps and stacks what the search does not need.
-    """
-    bearing, (middle2, middle3, middle4), (half2, half3, half4) = ranges
-    _, a2, a3, a4 = links
-    distance = distance[..., None]
-    x, y = distance - a4 * np.cos(turn), -a4 * np.sin(turn)
-    raw = (x * x + y * y - (a2 * a2 + a3 * a3)) / (2.0 * a2 * a3)
-    c3 = np.minimum(np.maximum(raw, -1.0), 1.0)
-    s3 = np.sqrt(1.0 - c3 * c3)
-    if knee_up:
-        s3 = -s3
-    q3 = np.arctan2(s3, c3)
-    lean = np.arctan2(y, x) - np.arctan2(a3 * s3, a2 + a3 * c3)
-    margin = half2 - np.abs(lean + (bearing[..., None] - middle2))
-    margin = np.minimum(margin, half3 - np.abs(q3 - middle3))
-    margin = np.minimum(margin, half4 - np.abs(turn - lean - q3 - middle4))
-    lacking = np.abs(raw - c3)
-    return np.where(lacking > _REACH_ROUNDING, -10.0 - lacking, margin)
