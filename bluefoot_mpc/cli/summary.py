@@ -16,6 +16,18 @@ from bluefoot_mpc.scenarios import Criterion
 Summary = Mapping[str, Any]
 Row = tuple[str, str, str]
 _NONE = "–"
+_UNITS = {
+    "s": "s",
+    "m": "m",
+    "mps": "m/s",
+    "deg": "°",
+    "rad": "rad",
+    "ns": "N·s",
+    "n": "N",
+    "j": "J",
+    "w": "W",
+}
+_NOT_SHOWN = ("window_s",)
 _FILES = (
     ("report", "report.html"),
     ("log", "log.mcap"),
@@ -65,7 +77,8 @@ def _rows(summary: Summary) -> list[Row]:
         ("tick", _scaled(tick.get("p50"), 1.0, 0, "µs median"), _tick_tail(summary)),
         ("speed of the simulation", _scaled(get("real_time_factor"), 1.0, 1, "x real time"), ""),
     ]
-    rows += [(name.replace("_", " "), _figure(value), "") for name, value in (get("figures") or {}).items()]
+    figures = (get("figures") or {}).items()
+    rows += [_figure_row(name, value) for name, value in figures if name not in _NOT_SHOWN]
     return [row for row in rows if row[1] != _NONE]
 
 
@@ -73,7 +86,7 @@ def _table(rows: list[Row]) -> Table:
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 1))
     table.add_column(style="cyan")
     table.add_column(justify="right", no_wrap=True)
-    table.add_column(style="dim")
+    table.add_column(style="dim", no_wrap=True)
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
     return table
@@ -104,7 +117,9 @@ def _number(value: Any, digits: int) -> str:
 
 def _scaled(value: Any, factor: float, digits: int, unit: str) -> str:
     text = _NONE if value is None else _number(value * factor, digits)
-    return text if text == _NONE else f"{text} {unit}"
+    if text == _NONE:
+        return text
+    return f"{text}{unit}" if unit.startswith("°") else f"{text} {unit}"
 
 
 def _of_command(summary: Summary) -> str:
@@ -134,7 +149,7 @@ def _tick_tail(summary: Summary) -> str:
     tick = summary.get("tick_us") or {}
     pairs = [(name, _number(tick.get(name), 0)) for name in ("p99", "max")]
     missed = summary.get("deadline_misses")
-    return _joined(*pairs, ("deadlines missed", _NONE if missed is None else str(missed)))
+    return _joined(*pairs, ("deadlines missed", str(missed) if missed else _NONE))
 
 
 def _peak(value: Any, unit: str = "°") -> str:
@@ -143,6 +158,15 @@ def _peak(value: Any, unit: str = "°") -> str:
 
 def _joined(*pairs: tuple[str, str]) -> str:
     return ", ".join(f"{name} {text}" for name, text in pairs if text != _NONE)
+
+
+def _figure_row(name: str, value: Any) -> Row:
+    """A scenario's own figure; a unit at the end of its name goes behind the number."""
+    label, _, suffix = name.rpartition("_")
+    unit = _UNITS.get(suffix, "") if label else ""
+    text = _figure(value)
+    shown = f"{text}{'' if unit == '°' else ' '}{unit}" if unit and text != _NONE else text
+    return ((label if unit else name).replace("_", " "), shown, "")
 
 
 def _figure(value: Any) -> str:

@@ -33,7 +33,15 @@ SUMMARY = {
     "tick_us": {"p50": 612.4, "p99": 1033.0, "max": 2000.0},
     "deadline_misses": 0,
     "real_time_factor": 11.3,
-    "figures": {"lift_off_lag": {"FL": 0.0, "FR": 0.5}, "pushes": 3, "survived": True, "missing": None},
+    "figures": {
+        "lift_off_lag": {"FL": 0.0, "FR": 0.5},
+        "pushes": 3,
+        "survived": True,
+        "missing": None,
+        "cycle_s": 0.375,
+        "turned_deg": 90.0,
+        "window_s": [2.0, 5.0],
+    },
 }
 
 
@@ -55,8 +63,8 @@ def test_key_figures_with_units(page):
         "walk, trot gait, 20.0 s, seed 3",
         "58.7 mm/s",
         "of 60 mm/s commanded",
-        "sideways -12 mm, turned 0.4 °",
-        "0.32 ° RMS",
+        "sideways -12 mm, turned 0.4°",
+        "0.32° RMS",
         "12.3 mm",
         "0.41 N·m RMS",
         "38.2 °C",
@@ -65,6 +73,8 @@ def test_key_figures_with_units(page):
         "11.3 x real time",
         "FL 0, FR 0.5",
         "yes",
+        "0.375 s",
+        "90°",
     ):
         assert words in text, text
 
@@ -75,6 +85,8 @@ def test_what_is_unknown_is_left_out(page):
     assert "ZMP" not in text
     assert "missing" not in text
     assert "None" not in text
+    assert "window" not in text
+    assert "deadlines" not in text
     assert "nan" not in text
 
 
