@@ -119,7 +119,7 @@ def _scaled(value: Any, factor: float, digits: int, unit: str) -> str:
     text = _NONE if value is None else _number(value * factor, digits)
     if text == _NONE:
         return text
-    return f"{text}{unit}" if unit.startswith("°") else f"{text} {unit}"
+    return f"{text}{unit}" if unit in ("°", "° RMS") else f"{text} {unit}"
 
 
 def _of_command(summary: Summary) -> str:
