@@ -67,6 +67,15 @@ class _Memory(NamedTuple):
     imu_age: float  # s since the last usable inertial sample
 
 
+class _Prediction(NamedTuple):
+    """The filter carried to a frame's time, before it sees that frame's feet."""
+
+    filter: FilterState
+    motion: Motion
+    roll: FloatArray  # (4, 3) m, way of the foot points by rolling, world axes
+    rotation: FloatArray  # (3, 3) rotation_base_to_world
+
+
 class Estimator:
     """State of the body from what the robot measures, one frame at a time.
 
@@ -123,23 +132,26 @@ class Estimator:
             memory.switches, frame.contact, frame.contact_valid, dt, self._config.contact.debounce
         )
         samples = usable_samples(frame.imu, memory.time, frame.time, memory.sample)
-        state, motion, roll = self._predict(memory, angles, samples, (memory.time, frame.time))
+        ahead = self._predict(memory, angles, samples, (memory.time, frame.time))
         points = feet_in_base(self._geometry, angles)
+        closed = frame.contact & frame.contact_valid & switches.contact
+        standing: list[bool] = (closed & known_legs(joints, self._config.joint)).tolist()
         state, stance, rest = self._correct(
-            memory, state, frame, (joints, switches), samples, legs=(angles, points)
+            memory, ahead, samples, standing=standing, angles=angles, points=points, dt=dt
         )
         heading = memory.heading
         if self._config.heading.enabled:
             state, heading = advance_heading(state, heading, frame.imu, dt, self._config.heading)
-        odometry = advance_position(memory.odometry, state.feet, roll, stance.used, motion.displacement)
-        rate = memory.rate
+        odometry = advance_position(
+            memory.odometry, state.feet, ahead.roll, stance.used, ahead.motion.displacement
+        )
+        sample, rate, age = memory.sample, memory.rate, memory.imu_age + dt
         if samples:
             mean, bias = mean_rate(samples), state.gyro_bias
             rate = (mean[0] - bias[0], mean[1] - bias[1], mean[2] - bias[2])
-        age = 0.0 if samples else memory.imu_age + dt
-        newest = samples[-1] if samples else memory.sample
+            sample, age = samples[-1], 0.0
         memory = _Memory(
-            frame.time, joints, angles, switches, state, stance, heading, odometry, rest, newest, rate, age
+            frame.time, joints, angles, switches, state, stance, heading, odometry, rest, sample, rate, age
         )
         return self._finish(memory, points)
 
@@ -177,15 +189,16 @@ class Estimator:
         complete = bool(valid.all())
         measured = frame.joint_position if complete else np.where(valid, frame.joint_position, 0.0)
         joints = advance_joints(state, measured, valid, dt, self._config.joint)
+        newest = measured.copy() if complete else np.where(valid, measured, joints.position)
         delay = frame.time - frame.joint_time
-        delay = np.where((delay > 0.0) & (delay <= MAX_READ_DELAY), delay, 0.0)
-        newest = measured if complete else np.where(valid, measured, joints.position)
-        return joints, newest + delay * joints.velocity
+        if delay.any():
+            newest += np.where((delay > 0.0) & (delay <= MAX_READ_DELAY), delay, 0.0) * joints.velocity
+        return joints, newest
 
     def _predict(
         self, memory: _Memory, angles: FloatArray, samples: list[Sample], span: tuple[float, float]
-    ) -> tuple[FilterState, Motion, FloatArray]:
-        """Carry the filter to the frame's time; also gives the way that rolling feet made."""
+    ) -> _Prediction:
+        """Carry the filter to the frame's time."""
         before = memory.filter
         motion = integrate(
             before.quaternion, before.velocity, samples, span=span,
@@ -196,24 +209,22 @@ class Estimator:
         rotation = rotation_matrix(motion.quaternion)
         roll = rolling(self._geometry.foot_radius, rotation, np.array(motion.turn), direction, bend)
         noise = frame_noise(samples, self._config.imu)
-        return predict(before, motion, roll, noise, dt=span[1] - span[0], config=self._config), motion, roll
+        state = predict(
+            before, motion, roll, noise, rotation=rotation, dt=span[1] - span[0], config=self._config
+        )
+        return _Prediction(state, motion, roll, rotation)
 
     def _correct(
-        self, memory: _Memory, state: FilterState, frame: SensorFrame,
-        sensed: tuple[JointState, SwitchState], samples: list[Sample], *,
-        legs: tuple[FloatArray, FloatArray],
+        self, memory: _Memory, ahead: _Prediction, samples: list[Sample], *, standing: list[bool],
+        angles: FloatArray, points: FloatArray, dt: float,
     ) -> tuple[FilterState, StanceState, RestState]:  # fmt: skip
         """Use standing feet, and the gyro's rest."""
         config = self._config
-        (joints, switches), (angles, points) = sensed, legs
-        dt = frame.time - memory.time
-        rotation = rotation_matrix(state.quaternion)
-        feet = measure_feet(
-            rotation, points - self._mount, foot_jacobians_in_base(self._geometry, angles), config.contact
+        jacobians = foot_jacobians_in_base(self._geometry, angles)
+        feet = measure_feet(ahead.rotation, points - self._mount, jacobians, config.contact)
+        state, stance = advance_stance(
+            ahead.filter, memory.stance, feet, standing, dt=dt, config=config.contact
         )
-        closed = frame.contact & frame.contact_valid & switches.contact
-        standing: list[bool] = (closed & known_legs(joints, config.joint)).tolist()
-        state, stance = advance_stance(state, memory.stance, feet, standing, dt=dt, config=config.contact)
         rest = advance_rest(memory.rest, angles, dt, config.rest)
         if at_rest(rest, standing, samples, state, config.rest):
             state = correct_bias(state, samples, config.rest)

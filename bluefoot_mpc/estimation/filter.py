@@ -14,6 +14,7 @@ whatever the attitude, and a foot set down anew is uncorrelated with the rest.
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,6 @@ from bluefoot_mpc.estimation.inertial import (
     Quaternion,
     Sample,
     Vector,
-    rotation_matrix,
 )
 from bluefoot_mpc.model.parameters import GRAVITY
 from bluefoot_mpc.types import N_LEGS, FloatArray
@@ -156,9 +156,9 @@ def transition(
     step[3:6, 18:21] += half @ rotation
     step[3:6, 21:24] = (-dt) * rotation
     fall = (0.5 * dt * dt) * rotation
-    for row in (6, 9, 12, 15):
-        step[row : row + 3, 0:3] = half
-        step[row : row + 3, 21:24] = fall
+    feet_rows = step[6:18].reshape(N_LEGS, 3, SIZE)
+    feet_rows[:, :, 0:3] = half
+    feet_rows[:, :, 21:24] = fall
     step[_FEET_DIAGONAL, _VELOCITY_DIAGONAL] = -dt
     return step, lever
 
@@ -168,8 +168,8 @@ _VELOCITY_DIAGONAL = np.tile(VELOCITY, N_LEGS)
 
 
 def predict(
-    state: FilterState, motion: Motion, roll: FloatArray, noise: Noise, *, dt: float,
-    config: EstimatorConfig,
+    state: FilterState, motion: Motion, roll: FloatArray, noise: Noise, *, rotation: FloatArray,
+    dt: float, config: EstimatorConfig,
 ) -> FilterState:  # fmt: skip
     """Carry estimate and covariance over one frame.
 
@@ -178,26 +178,30 @@ def predict(
         motion: mean motion of the IMU, from `inertial.integrate`.
         roll: (4, 3) m, way of the foot points over the ground by rolling, world axes.
         noise: of the frame's inertial samples.
+        rotation: (3, 3) rotation_base_to_world at the end.
         dt: s.
         config: drifts and slip.
     """
     velocity = 0.5 * (np.array(state.velocity) + motion.velocity)
     feet = state.feet + roll - np.array(motion.displacement)
-    rotation = rotation_matrix(motion.quaternion)
     step, lever = transition(rotation, velocity, state.feet, dt)
     covariance = step @ state.covariance @ step.T
     covariance[:18, :18] += (noise.rate * dt * dt) * (lever @ lever.T)
-    covariance.reshape(-1)[:: SIZE + 1] += _diagonal_noise(noise, dt, config)
+    diagonal = covariance.reshape(-1)[:: SIZE + 1]
+    diagonal += dt * _drift(config)
+    horizontal, vertical = noise.force
+    diagonal[3:5] += horizontal * dt * dt
+    diagonal[5] += vertical * dt * dt
     return state._replace(
         quaternion=motion.quaternion, velocity=motion.velocity, feet=feet, covariance=covariance
     )
 
 
-def _diagonal_noise(noise: Noise, dt: float, config: EstimatorConfig) -> FloatArray:
+@functools.lru_cache(maxsize=8)
+def _drift(config: EstimatorConfig) -> FloatArray:
+    """(26,) variances per second that slip and drifts add; do not write to it."""
     diagonal = np.zeros(SIZE)
-    diagonal[3:5] = noise.force[0] * dt * dt
-    diagonal[5] = noise.force[1] * dt * dt
-    diagonal[6:18] = config.contact.slip**2 * dt
-    diagonal[18:21] = config.imu.gyro_drift**2 * dt
-    diagonal[21:24] = config.imu.accel_drift**2 * dt
+    diagonal[FEET] = config.contact.slip**2
+    diagonal[GYRO_BIAS] = config.imu.gyro_drift**2
+    diagonal[ACCEL_BIAS] = config.imu.accel_drift**2
     return diagonal

@@ -57,11 +57,14 @@ def advance_joints(
     fresh = state.age > config.lost_after
     decay = 1.0 if dt <= 0.0 else math.exp(-dt / config.memory)
     predicted = state.position + dt * state.velocity
-    residual = np.where(valid, measured - predicted, 0.0)
+    residual = measured - predicted
+    complete = bool(valid.all())
+    if not complete:
+        residual = np.where(valid, residual, 0.0)
     beta = config.beta / dt if dt > 0.0 else 0.0
     position = predicted + config.alpha * residual
     velocity = state.velocity + beta * residual
-    if not valid.all():
+    if not complete:
         velocity = np.where(valid, velocity, decay * velocity)
     if fresh.any():
         taken = fresh & valid

@@ -18,6 +18,7 @@ _ROWS = tuple(
     np.concatenate([FEET[3 * leg : 3 * leg + 3] for leg in range(N_LEGS) if mask >> leg & 1] or [FEET[:0]])
     for mask in range(1 << N_LEGS)
 )
+_UNIT = np.eye(3)
 
 
 class FootMeasurement(NamedTuple):
@@ -26,10 +27,12 @@ class FootMeasurement(NamedTuple):
     Attributes:
         points: (4, 3) m, relative to the IMU, base axes.
         noise: (4, 3, 3) m², covariances in world axes.
+        rotation: (3, 3) rotation_base_to_world that was used for the noise, the predicted one.
     """
 
     points: FloatArray
     noise: FloatArray
+    rotation: FloatArray
 
 
 class StanceState(NamedTuple):
@@ -59,8 +62,8 @@ def measure_feet(
     """
     levers = rotation @ jacobians
     noise = config.joint_noise**2 * (levers @ levers.transpose(0, 2, 1))
-    noise += config.foot_noise**2 * np.eye(3)
-    return FootMeasurement(points, noise)
+    noise += config.foot_noise**2 * _UNIT
+    return FootMeasurement(points, noise, rotation)
 
 
 def advance_stance(
@@ -84,7 +87,7 @@ def advance_stance(
         dt: s.
         config: gates.
     """
-    residual = feet.points @ rotation_matrix(state.quaternion).T - state.feet
+    residual = feet.points @ feet.rotation.T - state.feet
     fits = [d < config.gate for d in distances(state, residual, feet.noise)]
     settled = tuple(
         (count + 1 if count == 0 or fit else 0) if stand else 0

@@ -218,7 +218,9 @@ def test_prediction_keeps_the_covariance_symmetric_and_grows_it():
         state.quaternion, state.velocity, [sample], span=(0.0, DT),
         biases=(state.gyro_bias, state.accel_bias),
     )  # fmt: skip
-    after = predict(state, motion, np.zeros((4, 3)), Noise(1e-4, (1e-2, 1e-2)), dt=DT, config=CONFIG)
+    after = predict(
+        state, motion, np.zeros((4, 3)), Noise(1e-4, (1e-2, 1e-2)), rotation=np.eye(3), dt=DT, config=CONFIG
+    )
     np.testing.assert_allclose(after.covariance, after.covariance.T, atol=1e-15)
     assert np.linalg.eigvalsh(after.covariance).min() > 0.0
     assert np.trace(after.covariance[:3, :3]) > np.trace(state.covariance[:3, :3])
