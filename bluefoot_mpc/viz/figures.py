@@ -132,7 +132,7 @@ def cpg_figure(series: CpgSeries) -> Figure:
     portrait.set(aspect="equal", xlabel="$y_1$", ylabel="$y_2$", xlim=(-1.4, 1.4), ylim=(-1.4, 1.4))
     portrait.set_title("phase portrait")
     portrait.legend(
-        loc="lower center", bbox_to_anchor=(0.5, -0.62), ncols=4, handlelength=1.2, columnspacing=1.0
+        loc="lower center", bbox_to_anchor=(0.5, -0.5), ncols=4, handlelength=1.2, columnspacing=1.0
     )
     return figure
 

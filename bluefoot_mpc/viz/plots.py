@@ -81,7 +81,10 @@ def rows(count: int, titles: list[str], gap: float = 0.09) -> dict[str, Any]:
     for index, title in enumerate(titles):
         top = 1.0 - index * (share + gap)
         name = "yaxis" if index == 0 else f"yaxis{index + 1}"
-        layout[name] = {"domain": [max(0.0, top - share), top], "title": {"text": title}}
+        layout[name] = {
+            "domain": [max(0.0, top - share), top],
+            "title": {"text": title, "font": {"size": 11}},
+        }
     anchor = "y" if count == 1 else f"y{count}"
     layout["xaxis"] = {"title": {"text": "time (s)"}, "anchor": anchor}
     return layout

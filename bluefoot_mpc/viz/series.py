@@ -45,7 +45,7 @@ class RunSeries:
         zmp_plan: (n, 2) m, ZMP that the controller assumed; NaN where it had none.
         reference: (n, 2) m, wanted trunk position, carried over from b' by the stance feet.
         torque: (n, 16) N·m motor torque (truth); load share times stall torque without truth.
-        temperature: (n, 16) °C.
+        temperature: (n, 16) °C of the motors (truth), else as the servos report it.
         voltage: (n,) V.
         power: (n,) W drawn by the servos; NaN without truth.
         push: (n, 3) N, push on the trunk; zeros without truth.
@@ -119,6 +119,7 @@ def extract(run: RunData, stall_torque: float) -> RunSeries:
     planned = from_virtual(planned, wanted_feet, feet[:, :, :2], ~swing, rpy[:, 2])
     com = _array([t.com for t in truth], n, 3) if has_truth else nothing
     rates = [t.v[5] for t in truth] if has_truth else [t.estimate.angular_velocity[2] for t in telemetry]
+    hot = [t.motor_temperature for t in truth] if has_truth else [f.joint_temperature for f in frames]
     share = _array([f.joint_load for f in frames], n, 16)
     return RunSeries(
         time=time - start, has_truth=has_truth, q=q,
@@ -134,7 +135,7 @@ def extract(run: RunData, stall_torque: float) -> RunSeries:
         loaded=_array([t.foot_force[:, 2] for t in truth], n, 4) > _LOADED if has_truth else switch,
         com=com, zmp=_measured_zmp(truth, time, com, n), zmp_plan=planned[1], reference=planned[0],
         torque=_array([t.motor_torque for t in truth], n, 16) if has_truth else share * stall_torque,
-        temperature=_array([f.joint_temperature for f in frames], n, 16),
+        temperature=_array(hot, n, 16),
         voltage=_array([f.voltage for f in frames], n),
         power=_array([t.electrical_power for t in truth], n) if has_truth else nothing[:, 0],
         push=_array([t.external_force for t in truth], n, 3) if has_truth else np.zeros((n, 3)),

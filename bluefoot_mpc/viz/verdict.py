@@ -154,7 +154,7 @@ def _way_tiles(summary: Mapping[str, Any]) -> list[Tile | None]:
     speed = _Goal(f"commanded {number(wanted, 0, 1e3)} ± 10 %", lambda x: abs(x - wanted) <= 0.1 * wanted)
     drift = _Goal("goal ≤ 10 % of distance", lambda x: abs(x) <= 0.1 * abs(distance or 0.0))
     return [
-        _tile("Distance", distance, 2, "m"),
+        _tile("Distance", distance, 2, "m", note="while measured"),
         _tile("Speed", summary.get("speed_mps"), 1, "mm/s", speed, scale=1e3),
         _tile("Sideways drift", summary.get("lateral_drift_m"), 0, "mm", drift, scale=1e3),
         _tile("Heading drift", summary.get("yaw_drift_deg"), 1, "°"),
@@ -232,13 +232,20 @@ class _Goal:
 
 
 def _tile(
-    label: str, value: Any, digits: int, unit: str = "", goal: _Goal | None = None, *, scale: float = 1.0
+    label: str,
+    value: Any,
+    digits: int,
+    unit: str = "",
+    goal: _Goal | None = None,
+    *,
+    scale: float = 1.0,
+    note: str = "",
 ) -> Tile | None:
     if value is None:
         return None
     text = number(value, digits, scale)
     if goal is None:
-        return Tile(label=label, value=text, unit=unit)
+        return Tile(label=label, value=text, unit=unit, note=note)
     status = "good" if goal.holds(float(value)) else "bad"
     return Tile(label=label, value=text, unit=unit, note=goal.note, status=status)
 

@@ -40,7 +40,7 @@
 
   function draw() {
     if (!state) return;
-    const i = recording.count - 1, degrees = (x) => (x * 180 / Math.PI).toFixed(1).replace("-", "\u2212") + "°";
+    const i = recording.count - 1;
     if (view) view.show(recording.time[i]);
     plan.show(recording.time[i]);
     const [roll, pitch] = recording.rollPitch(i), [forward, left, turn] = state.speed;

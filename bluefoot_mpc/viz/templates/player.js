@@ -50,6 +50,11 @@ class Recording {
   }
 }
 
+// Degrees of an angle in rad, as text without a negative zero.
+function degrees(angle) {
+  return ((angle * 180 / Math.PI).toFixed(1) + "°").replace(/^-(?=0\.0°)/, "").replace("-", "\u2212");
+}
+
 function hull(points) {
   if (points.length < 3) return points;
   const sorted = points.slice().sort((a, b) => a[0] - b[0] || a[1] - b[1]);
@@ -424,7 +429,6 @@ function startReplay(root, data) {
   const view = openView(role("view"), recording);
   const slider = role("time"), button = role("play"), label = role("clock"), state = role("state");
   slider.max = recording.duration; slider.step = 0.01;
-  const degrees = (x) => (x * 180 / Math.PI).toFixed(1).replace("-", "\u2212") + "°";
   clock.watch((t) => {
     if (view) view.show(t);
     if (plan) plan.show(t);
