@@ -28,7 +28,7 @@ class PostureConfig:
     max_offset: float = 0.12  # m, each axis of a commanded offset
     max_tilt: float = 0.7  # rad, each axis of a commanded rotation
     level_gain: float = 0.15  # 1/s, slow integral that trims the trunk's mean tilt away
-    level_bound: float = 0.06  # rad, largest trim
+    level_bound: float = 0.15  # rad, largest trim
 
     def __post_init__(self) -> None:
         for name in ("trunk_height", "stance_x", "stance_y"):

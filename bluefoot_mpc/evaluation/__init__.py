@@ -1,0 +1,1 @@
+"""Batteries of runs: many seeds of many scenarios, judged against stated limits."""
