@@ -194,7 +194,9 @@ def _frame(time, joints, load, contact, rng) -> SensorFrame:
     )
 
 
-def _truth(time, position, quaternion, joints, velocity, feet, lift, contact, load, rng) -> TruthSample:
+def _truth(  # noqa: PLR0917
+    time, position, quaternion, joints, velocity, feet, lift, contact, load, rng
+) -> TruthSample:
     com = position + np.array([0.002, 0.0, -0.01])
     weight = MASS * 9.80665 * contact / max(1, contact.sum())
     push = np.array([0.0, 20.0, 0.0]) if 2.5 <= time < 2.6 else np.zeros(3)
