@@ -50,7 +50,7 @@ walk: $(STAMP) ## the main job
 	@$(BIN)/bluefoot run walk $(ARGS)
 
 test: $(STAMP) ## all tests
-	@$(BIN)/python -m pytest $(ARGS)
+	@$(BIN)/python -m pytest -n auto $(ARGS)
 
 lint: $(STAMP) ## style, types, layers, generated files
 	$(BIN)/ruff check .

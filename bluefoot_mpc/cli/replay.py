@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
 from typing import Any
 
 from bluefoot_mpc.cli.arguments import ReplayCommand
@@ -39,13 +38,9 @@ def _show(command: ReplayCommand, log: RunLog) -> None:
     if not log.telemetry:
         raise LogError(f"{log.path} holds nothing to show: not one tick of the controller is readable")
     try:
-        show_replay(log, view=command.view, html=command.html, announce=_announce)
+        show_replay(log, view=command.view, html=command.html)
     except OSError as error:
         raise ConfigurationError(f"cannot write {command.html}: {error.strerror or error}") from error
-
-
-def _announce(address: str) -> None:
-    print(f"live view: {address}", file=sys.stderr, flush=True)
 
 
 def describe(log: RunLog) -> dict[str, Any]:
