@@ -152,7 +152,9 @@ def tiles(summary: Mapping[str, Any], stall_torque: float, period: float) -> lis
 def _way_tiles(summary: Mapping[str, Any]) -> list[Tile | None]:
     distance, wanted = summary.get("distance_m"), float(summary["speed_ref_mps"])
     speed = _Goal(f"commanded {number(wanted, 0, 1e3)} ± 10 %", lambda x: abs(x - wanted) <= 0.1 * wanted)
-    drift = _Goal("goal ≤ 10 % of distance", lambda x: abs(x) <= 0.1 * abs(distance or 0.0))
+    drift = None
+    if distance is not None:
+        drift = _Goal("goal ≤ 10 % of distance", lambda x: abs(x) <= 0.1 * abs(distance))
     return [
         _tile("Distance", distance, 2, "m", note="while measured"),
         _tile("Speed", summary.get("speed_mps"), 1, "mm/s", speed, scale=1e3),

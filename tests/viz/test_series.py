@@ -56,8 +56,8 @@ def test_virtual_frame_turns_with_the_heading() -> None:
     yaw = np.array([0.5 * np.pi])
     turned = np.stack([3.0 - feet[..., 1], 4.0 + feet[..., 0]], axis=-1)
     stance = np.array([[True, False, False, True]])
-    point = from_virtual(np.array([[[0.1, 0.0]]]), feet, turned, stance, yaw)
-    np.testing.assert_allclose(point, [[[3.0, 4.1]]], atol=1e-12)
+    point = from_virtual(np.array([[[0.1, 0.05]]]), feet, turned, stance, yaw)
+    np.testing.assert_allclose(point, [[[2.95, 4.1]]], atol=1e-12)
 
 
 def test_envelope_keeps_peaks() -> None:

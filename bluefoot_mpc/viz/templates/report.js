@@ -61,8 +61,10 @@
   }
 
   let busy = false;
+  let held = false;  // a person has zoomed in: nothing pages until that is undone
   async function together(source, range) {
     windowWidth = 0;
+    held = Boolean(range);
     busy = true;
     for (const { node, figure } of drawn) {
       if (!figure.time || (node === source && range)) continue;
@@ -90,7 +92,7 @@
 
   // Figures that show a window of the run page along with the replay.
   function page(t) {
-    if (busy) return;
+    if (busy || held) return;
     for (const { node, figure } of drawn) {
       const width = windowWidth || (figure.follow ? figure.window : 0);
       if (!figure.time || !width) continue;
@@ -110,6 +112,7 @@
   let windowWidth = 0;
   function chooseWindow(width) {
     windowWidth = width;
+    held = false;
     for (const { node, figure } of drawn) {
       if (figure.time && !width) relayout(node, figure.full);
     }
