@@ -51,7 +51,13 @@ class ModeState:
 
 
 def advance(
-    state: ModeState, wanted: Mode, safety: SafetyRequest, walking: bool, tilt_deg: float, dt: float, config: ModeConfig
+    state: ModeState,
+    wanted: Mode,
+    safety: SafetyRequest,
+    walking: bool,
+    tilt_deg: float,
+    dt: float,
+    config: ModeConfig,
 ) -> ModeState:
     """The next state.
 
@@ -68,11 +74,16 @@ def advance(
     target = state.mode if state.mode is Mode.SAFE else _target(wanted, safety)
     if state.mode is Mode.SAFE and state.fallen:
         return replace(state, torque=max(0.0, state.torque - dt / config.limp_time))
-    overdue = state.ending >= config.gait_end_time and (state.mode is Mode.SAFE or safety.level >= SafetyLevel.SIT)
+    overdue = state.ending >= config.gait_end_time and (
+        state.mode is Mode.SAFE or safety.level >= SafetyLevel.SIT
+    )
     if target is not Mode.WALK and walking and not overdue:
         # Feet first: the gait is told to end, and the mode changes when it has.
         return replace(state, ending=state.ending + dt)
-    return _settle(replace(state, mode=target, ending=0.0 if not walking else state.ending), dt, config)
+    ending = state.ending if walking else 0.0
+    if target is not state.mode or ending != state.ending:
+        state = replace(state, mode=target, ending=ending)
+    return _settle(state, dt, config)
 
 
 def _enter_safe(state: ModeState, safety: SafetyRequest, tilt_deg: float, config: ModeConfig) -> ModeState:
@@ -98,9 +109,15 @@ def _settle(state: ModeState, dt: float, config: ModeConfig) -> ModeState:
     upright = state.mode in (Mode.STAND, Mode.WALK)
     level = max(0.0, state.sit_level - step) if upright else min(1.0, state.sit_level + step)
     limp = state.mode in (Mode.OFF, Mode.SAFE) and level >= 1.0
-    torque = max(0.0, state.torque - dt / config.limp_time) if limp else min(1.0, state.torque + dt / config.limp_time)
+    torque = (
+        max(0.0, state.torque - dt / config.limp_time)
+        if limp
+        else min(1.0, state.torque + dt / config.limp_time)
+    )
     if state.mode is Mode.SAFE:
         torque = min(torque, state.torque)
     # Nothing walks before it stands.
     mode = Mode.STAND if state.mode is Mode.WALK and level > 0.0 else state.mode
+    if (mode, level, torque) == (state.mode, state.sit_level, state.torque):
+        return state
     return replace(state, mode=mode, sit_level=level, torque=torque)

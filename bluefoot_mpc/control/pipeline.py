@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time as clock
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -84,7 +84,8 @@ class Pipeline:
         start = clock.perf_counter_ns()
         dt = self.period
         estimate = self._estimator.step(frame)
-        tilt = rotation_from_rpy(np.array([estimate.rpy[0], estimate.rpy[1], 0.0]))
+        roll, pitch, _ = estimate.rpy.tolist()
+        tilt = rotation_from_rpy(np.array([roll, pitch, 0.0]))
         before = self._modes
         self._modes = modes.advance(
             before, motion.mode, safety or SafetyRequest(), self._walking,
@@ -102,7 +103,11 @@ class Pipeline:
             events = (*events, f"mode {before.mode} -> {self._modes.mode} {self._modes.reason}".rstrip())
         telemetry = Telemetry(
             time=frame.time, mode=self._modes.mode, estimate=estimate, phase=gait.phase, reference=reference,
-            motion=replace(motion, velocity=twist.velocity, yaw_rate=twist.yaw_rate), zmp=zmp, events=events,
+            motion=MotionCommand(
+                mode=motion.mode, velocity=twist.velocity, yaw_rate=twist.yaw_rate, gait=motion.gait,
+                trunk=motion.trunk,
+            ),
+            zmp=zmp, events=events,
             tick_us=(clock.perf_counter_ns() - start) * 1e-3,
         )  # fmt: skip
         return ControlOutput(command=command, telemetry=telemetry)
@@ -110,7 +115,7 @@ class Pipeline:
     def _twist(self, motion: MotionCommand, estimate: BodyState, tilt: FloatArray) -> tracking.Twist:
         """The commanded twist, corrected by odometry while walking."""
         wants = motion.mode is Mode.WALK and self._modes.mode is Mode.WALK and self._modes.ending == 0.0
-        moving = wants and (motion.yaw_rate != 0.0 or bool(np.any(motion.velocity)))
+        moving = wants and (motion.yaw_rate != 0.0 or any(motion.velocity.tolist()))
         if not moving:
             self._tracking = tracking.rest(self._tracking)
             return tracking.Twist(velocity=np.zeros(2), yaw_rate=0.0)
@@ -131,5 +136,3 @@ class Pipeline:
             velocity=twist.velocity, yaw_rate=twist.yaw_rate, gait=motion.gait, contact=estimate.contact,
             foot_position=feet, tilt_rate_error=rates[:2],
         )  # fmt: skip
-
-

@@ -53,17 +53,28 @@ def follow_pose(pose: FloatArray, wanted: TrunkPose, dt: float, config: PostureC
         dt: s.
         config: bounds and rates.
     """
-    target = np.empty(6)
-    np.clip(wanted.position, -config.max_offset, config.max_offset, out=target[:3])
-    np.clip(wanted.rpy, -config.max_tilt, config.max_tilt, out=target[3:])
-    step = np.repeat([config.max_rate * dt, config.max_turn_rate * dt], 3)
-    return np.asarray(pose + np.clip(target - pose, -step, step))
+    target: list[float] = wanted.position.tolist() + wanted.rpy.tolist()
+    now: list[float] = pose.tolist()
+    if target == now:
+        return pose
+    linear = (config.max_offset, config.max_rate * dt)
+    angular = (config.max_tilt, config.max_turn_rate * dt)
+    moved = [_follow(*pair, *linear) for pair in zip(now[:3], target[:3], strict=True)]
+    moved += [_follow(*pair, *angular) for pair in zip(now[3:], target[3:], strict=True)]
+    return np.array(moved)
+
+
+def _follow(value: float, target: float, bound: float, step: float) -> float:
+    """`value` moved by `step` at most towards the target, which is cut to ±`bound`."""
+    target = min(max(target, -bound), bound)
+    return value + min(max(target - value, -step), step)
 
 
 def trim_level(trim: FloatArray, tilt_error: FloatArray, dt: float, config: PostureConfig) -> FloatArray:
     """(2,) rad, slow integral of the tilt error (estimate minus reference), bounded."""
-    moved = trim - config.level_gain * dt * tilt_error
-    return np.minimum(np.maximum(moved, -config.level_bound), config.level_bound)
+    gain, bound = config.level_gain * dt, config.level_bound
+    pairs = zip(trim.tolist(), tilt_error.tolist(), strict=True)
+    return np.array([min(max(value - gain * error, -bound), bound) for value, error in pairs])
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -47,7 +47,8 @@ class JointTargets:
         feet = (reference.foot_position - reference.trunk_position) @ rotation
         gamma = ankle_directions(self._geometry, self._ankle, feet, rotation[2], table=self._table)
         result = inverse(self._geometry, feet, gamma)
-        goal = np.clip(result.joints, self._geometry.lower, self._geometry.upper)
+        # Two ufuncs: np.clip takes three times as long on a few numbers.
+        goal = np.minimum(np.maximum(result.joints, self._geometry.lower), self._geometry.upper)
         events = tuple(violation.describe() for violation in result.violations)
         return self._soften(goal, joints, dt), events
 

@@ -8,6 +8,7 @@ wrong estimate can never run away with the gait.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -71,11 +72,11 @@ def advance(
         dt: s.
         config: gains and bounds.
     """
-    heading = yaw if np.isnan(state.heading) else wrap_angle(state.heading + wanted.yaw_rate * dt)
+    heading = yaw if math.isnan(state.heading) else wrap_angle(state.heading + wanted.yaw_rate * dt)
     error = wrap_angle(heading - yaw)
-    bound = config.velocity_bound
-    velocity = state.velocity + config.velocity_gain * dt * (wanted.velocity - measured.velocity)
-    velocity = np.minimum(np.maximum(velocity, -bound), bound)
+    gain, bound = config.velocity_gain * dt, config.velocity_bound
+    axes = zip(state.velocity.tolist(), wanted.velocity.tolist(), measured.velocity.tolist(), strict=True)
+    velocity = np.array([min(max(slow + gain * (goal - seen), -bound), bound) for slow, goal, seen in axes])
     limit = config.heading_bound
     slow = min(limit, max(-limit, state.yaw_rate + config.yaw_integral_gain * error * dt))
     turn = min(limit, max(-limit, config.heading_gain * error + slow))

@@ -61,13 +61,16 @@ class TrunkPlanner:
             self._trim = posture.trim_level(self._trim, error, dt, config)
         zmp = self._place(gait, estimate, dt)
         height = self._height * (1.0 - sit_level * (1.0 - config.sit_height_share))
-        position = self._pose[:3] + [config.trunk_forward, 0.0, height]
-        position[:2] += self._placement
-        self.position = position
-        rpy = self._pose[3:].copy()
-        rpy[:2] += self._trim
+        x, y, z, roll, pitch, yaw = self._pose.tolist()
+        shift_x, shift_y = self._placement.tolist()
+        trim_roll, trim_pitch = self._trim.tolist()
+        self.position = np.array([x + config.trunk_forward + shift_x, y + shift_y, z + height])
+        rpy = np.array([roll + trim_roll, pitch + trim_pitch, yaw])
         reference = PostureReference(
-            trunk_position=position, trunk_rpy=rpy, foot_position=gait.foot_position, swing=gait.phase.swing
+            trunk_position=self.position,
+            trunk_rpy=rpy,
+            foot_position=gait.foot_position,
+            swing=gait.phase.swing,
         )
         return reference, zmp
 

@@ -7,7 +7,7 @@ budget goes to the nearest of the three points of its link.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,6 +25,11 @@ class MassPoints:
         joint: (4,) kg at hip_yaw, hip_pitch, knee, ankle.
         link: (4,) kg at the link midpoints.
         foot: kg.
+        leg_weights: (5,) kg, the leg's masses spread over its joints and foot. A
+            link midpoint weighs half on either end, so that ``leg_weights @ points``
+            with the five points of a leg is the leg's first moment.
+        leg: kg, mass of one leg.
+        total: kg, trunk and all four legs.
     """
 
     trunk: float
@@ -32,24 +37,18 @@ class MassPoints:
     joint: FloatArray
     link: FloatArray
     foot: float
+    leg_weights: FloatArray = field(init=False)
+    leg: float = field(init=False)
+    total: float = field(init=False)
 
-    @property
-    def leg_weights(self) -> FloatArray:
-        """(5, 1) kg: the leg's masses spread over its joints and foot.
-
-        A link midpoint weighs half on either end, so that
-        ``weights.T @ points`` with the five points of a leg is the leg's first moment.
-        """
+    def __post_init__(self) -> None:
         weights = np.zeros(5)
         weights[:4] += self.joint + 0.5 * self.link
         weights[1:] += 0.5 * self.link
         weights[4] += self.foot
-        return weights
-
-    @property
-    def total(self) -> float:
-        """Mass of the trunk and all four legs, kg."""
-        return self.trunk + 4.0 * float(self.joint.sum() + self.link.sum() + self.foot)
+        object.__setattr__(self, "leg_weights", weights)
+        object.__setattr__(self, "leg", float(weights.sum()))
+        object.__setattr__(self, "total", self.trunk + 4.0 * self.leg)
 
 
 def lump(parameters: RobotParameters) -> MassPoints:

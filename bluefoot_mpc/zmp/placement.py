@@ -7,6 +7,7 @@ from the centre of mass, and the boundary force is a vector.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +33,9 @@ class PlacementConfig:
     max_rate: float = 0.25  # m/s
 
     def __post_init__(self) -> None:
-        require_nonnegative(gain=self.gain, lead=self.lead, boundary_gain=self.boundary_gain, max_offset=self.max_offset)
+        require_nonnegative(
+            gain=self.gain, lead=self.lead, boundary_gain=self.boundary_gain, max_offset=self.max_offset
+        )
         require_positive(boundary_sharpness=self.boundary_sharpness, max_rate=self.max_rate)
         if not 0.0 <= self.reach_min < self.reach_max:
             raise ConfigurationError(
@@ -63,10 +66,15 @@ def static_zmp(
         leg_points: (4, 5, 3) m, points of each leg in the same frame.
         swing: (4,) 1 where the trunk carries the leg; fractions blend.
     """
-    levers = masses.leg_weights @ (leg_points[:, :, :2] - com[:2])
+    com_x, com_y, _ = com.tolist()
+    moments = (masses.leg_weights @ leg_points).tolist()
     # tau = lever x m g points sideways of the lever; Rz(pi/2) turns it back
     # against the lever, and |g| cancels.
-    return np.asarray(com[:2] - swing @ levers / masses.trunk)
+    x, y = com_x, com_y
+    for share, (moment_x, moment_y, _) in zip(swing.tolist(), moments, strict=True):
+        x -= share * (moment_x - masses.leg * com_x) / masses.trunk
+        y -= share * (moment_y - masses.leg * com_y) / masses.trunk
+    return np.array([x, y])
 
 
 def boundary_force(trunk: FloatArray, feet: FloatArray, config: PlacementConfig) -> FloatArray:
@@ -77,17 +85,26 @@ def boundary_force(trunk: FloatArray, feet: FloatArray, config: PlacementConfig)
         feet: (4, 3) m, in the same frame.
         config: reaches and sharpness.
     """
-    arm = feet - trunk
-    distance = np.sqrt((arm * arm).sum(axis=1))
     sharpness = config.boundary_sharpness
-    # Exponents are capped: far outside, the direction matters and not the size.
-    pull = np.exp(np.minimum(sharpness * (distance - config.reach_max), 5.0))
-    push = np.exp(np.minimum(sharpness * (config.reach_min - distance), 5.0))
-    return np.asarray(((pull - push) / distance) @ arm[:, :2])
+    force_x = force_y = 0.0
+    for x, y, z in (feet - trunk).tolist():
+        distance = math.sqrt(x * x + y * y + z * z)
+        # Exponents are capped: far outside, the direction matters and not the size.
+        pull = math.exp(min(sharpness * (distance - config.reach_max), 5.0))
+        push = math.exp(min(sharpness * (config.reach_min - distance), 5.0))
+        share = (pull - push) / distance
+        force_x += share * x
+        force_y += share * y
+    return np.array([force_x, force_y])
 
 
 def advance(
-    offset: FloatArray, target: FloatArray, force: FloatArray, masses: MassPoints, dt: float, config: PlacementConfig
+    offset: FloatArray,
+    target: FloatArray,
+    force: FloatArray,
+    masses: MassPoints,
+    dt: float,
+    config: PlacementConfig,
 ) -> FloatArray:
     """(2,) m, trunk offset after `dt` of the placement law, bounded in size and rate.
 
@@ -99,10 +116,15 @@ def advance(
         dt: s.
         config: gains and bounds.
     """
-    rate = config.gain * (target - offset) + config.boundary_gain / masses.trunk * force
-    speed = float(np.hypot(*rate))
+    # Complex numbers: plain planar vectors, without the cost of small arrays.
+    place = complex(*offset.tolist())
+    pushed = config.boundary_gain / masses.trunk * complex(*force.tolist())
+    rate = config.gain * (complex(*target.tolist()) - place) + pushed
+    speed = abs(rate)
     if speed > config.max_rate:
         rate *= config.max_rate / speed
-    moved = offset + rate * dt
-    size = float(np.hypot(*moved))
-    return moved if size <= config.max_offset else moved * (config.max_offset / size)
+    place += rate * dt
+    size = abs(place)
+    if size > config.max_offset:
+        place *= config.max_offset / size
+    return np.array([place.real, place.imag])
