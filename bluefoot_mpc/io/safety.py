@@ -29,6 +29,8 @@ from bluefoot_mpc.types import (
 
 log = logging.getLogger(__name__)
 
+_ONES = np.ones(N_JOINTS)
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SafetyConfig:
@@ -70,6 +72,7 @@ class SafetySupervisor:
         self.robot = robot
         self.period = robot.period
         self._lower, self._upper, self._config = lower, upper, config
+        self._reach = config.max_goal_rate * robot.period
         self._clear()
 
     def _clear(self) -> None:
@@ -103,12 +106,9 @@ class SafetySupervisor:
             self._latch(SafetyLevel.STOP, f"command is not finite for {', '.join(bad)}: discarded")
             return previous if previous is not None else self._hold()
         reference = self._position if previous is None else previous.position
-        reach = self._config.max_goal_rate * self.period
-        goal = np.clip(command.position, reference - reach, reference + reach)
-        goal = np.clip(goal, self._lower, self._upper)
-        limit = np.clip(command.torque_limit, 0.0, 1.0)
-        if self.stopped:
-            limit = np.zeros(N_JOINTS)
+        goal = _clip(command.position, reference - self._reach, reference + self._reach)
+        goal = _clip(goal, self._lower, self._upper)
+        limit = np.zeros(N_JOINTS) if self.stopped else _clip(command.torque_limit, 0.0, 1.0)
         self._last = JointCommand(position=goal, speed=np.maximum(command.speed, 0.0), torque_limit=limit)
         return self._last
 
@@ -123,7 +123,7 @@ class SafetySupervisor:
 
     def _hold(self) -> JointCommand:
         return JointCommand(
-            position=np.clip(self._position, self._lower, self._upper),
+            position=_clip(self._position, self._lower, self._upper),
             speed=np.zeros(N_JOINTS),
             torque_limit=np.ones(N_JOINTS),
         )
@@ -136,21 +136,26 @@ class SafetySupervisor:
 
     def _publish(self, passing: tuple[tuple[SafetyLevel, str], ...]) -> None:
         findings = (*self._latched, *passing)
+        if not findings and self.request.level is SafetyLevel.NONE:
+            return
         level = max((level for level, _ in findings), default=SafetyLevel.NONE)
         self.request = SafetyRequest(level=level, reasons=tuple(reason for _, reason in findings))
 
     def _watch(self, frame: SensorFrame) -> None:
         config = self._config
-        if frame.joint_valid.all():
+        # Lists: going through sixteen numbers costs less than one call of numpy.
+        valid: list[bool] = frame.joint_valid.tolist()
+        if all(valid):
             self._position = frame.joint_position
         self._watch_voltage(frame)
-        hottest = int(np.argmax(frame.joint_temperature))
-        temperature = float(frame.joint_temperature[hottest])
-        if temperature >= config.temperature_sit:
-            level = SafetyLevel.STOP if temperature >= config.temperature_stop else SafetyLevel.SIT
+        temperature: list[float] = frame.joint_temperature.tolist()
+        hot = [i for i, value in enumerate(temperature) if value >= config.temperature_sit]
+        if hot:
+            hottest = max(hot, key=temperature.__getitem__)
+            level = SafetyLevel.STOP if temperature[hottest] >= config.temperature_stop else SafetyLevel.SIT
             self._latch(level, f"servo {JOINTS[hottest]} is hot (limit {config.temperature_sit:g} °C)")
         blend = min(1.0, self.period / config.silence_window)
-        self._silent_share += blend * (1.0 - float(frame.joint_valid.mean()) - self._silent_share)
+        self._silent_share += blend * (valid.count(False) / N_JOINTS - self._silent_share)
         passing: tuple[tuple[SafetyLevel, str], ...] = ()
         if self._silent_share > config.max_silent_share:
             silent = ", ".join(JOINTS[i] for i in np.flatnonzero(~frame.joint_valid))
@@ -171,9 +176,14 @@ class SafetySupervisor:
             self._latch(SafetyLevel.SIT, f"battery low (below {config.voltage_sit:g} V)")
 
 
+def _clip(values: FloatArray, low: FloatArray | float, high: FloatArray | float) -> FloatArray:
+    # np.clip does the same in three times the time, on a few numbers.
+    return np.minimum(np.maximum(values, low), high)
+
+
 def _finite(values: FloatArray) -> bool:
-    # A sum is finite only when every entry is: one call instead of two on the hot path.
-    return math.isfinite(float(values.sum()))
+    # A sum is finite only when every entry is; as a product it is the fastest call of numpy.
+    return math.isfinite(float(values @ _ONES))
 
 
 def _finite_joints(command: JointCommand) -> BoolArray:
