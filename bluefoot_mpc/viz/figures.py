@@ -42,6 +42,7 @@ from bluefoot_mpc.viz.style import (
 )
 
 FORMATS = ("png", "svg")
+_TRIANGLE = 3
 
 
 def write_figures(robot: RobotModel, folder: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
@@ -207,7 +208,7 @@ def _shade_blend(axes: Axes, series: CpgSeries) -> None:
 
 
 def _draw_support(axes: Axes, series: RunSeries, pick: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> None:
-    """Hulls of the scheduled feet, once for each change of the set; two feet give a line."""
+    """Support while a leg swings, once for each change: triangles, or lines on two feet."""
     hulls: list[Polygon] = []
     lines = []
     before = None
@@ -217,10 +218,10 @@ def _draw_support(axes: Axes, series: RunSeries, pick: np.ndarray[tuple[int], np
             continue
         before = stance
         corners = convex_hull(series.feet[k, list(stance), :2])
-        if len(corners) > 2:
+        if len(corners) == _TRIANGLE:
             hulls.append(Polygon(corners))
-        elif len(corners) == 2:
+        elif len(corners) < _TRIANGLE:
             lines.append(corners)
-    axes.add_collection(PatchCollection(hulls, facecolor=SUPPORT, alpha=0.07, edgecolor="none"))
-    axes.add_collection(PatchCollection(hulls, facecolor="none", edgecolor=SUPPORT, lw=0.6))
-    axes.add_collection(LineCollection(lines, colors=SUPPORT, lw=0.8))
+    axes.add_collection(PatchCollection(hulls, facecolor=SUPPORT, alpha=0.05, edgecolor="none"))
+    axes.add_collection(PatchCollection(hulls, facecolor="none", edgecolor=SUPPORT, lw=0.5, alpha=0.7))
+    axes.add_collection(LineCollection(lines, colors=SUPPORT, lw=0.6, alpha=0.8))
