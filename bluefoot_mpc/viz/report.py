@@ -9,7 +9,7 @@ from typing import Any
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.settings import dump_toml
-from bluefoot_mpc.viz import plots, plots_machine
+from bluefoot_mpc.viz import plots, plots_ground, plots_machine
 from bluefoot_mpc.viz.animation import animation_data, viewer_script
 from bluefoot_mpc.viz.packing import stretches
 from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
@@ -85,8 +85,8 @@ def _panels(series: RunSeries, stall_torque: float, period: float) -> list[Panel
     return [
         plots.footfall(series, period),
         plots.attitude(series),
-        plots.path(series),
-        plots.balance(series),
+        plots_ground.path(series),
+        plots_ground.balance(series),
         plots.motion(series),
         plots_machine.torques(series, stall_torque),
         plots_machine.torque_strip(series, stall_torque),
