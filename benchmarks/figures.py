@@ -29,7 +29,9 @@ from bluefoot_mpc.runtime.versions import installed_versions
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("batteries", nargs="*", help=f"which; all of them by default: {', '.join(BATTERIES)}")
     parser.add_argument("--out", type=Path, default=Path("figures.json"))
     parser.add_argument("--store", type=Path, default=Path("runs/figures.jsonl"))
@@ -42,7 +44,11 @@ def main() -> int:
         print(error, file=sys.stderr)
         return error.exit_status
     for name, verdicts in found.items():
-        text = walking_table(verdicts) if name in ("walking", "other robots", "robustness") else limits_table(verdicts)
+        text = (
+            walking_table(verdicts)
+            if name in ("walking", "other robots", "robustness")
+            else limits_table(verdicts)
+        )
         console.print(Markdown(f"## {name}\n\n{text}") if console.is_terminal else f"\n## {name}\n\n{text}")
     return 0 if all(verdict.passed for verdicts in found.values() for verdict in verdicts) else 1
 

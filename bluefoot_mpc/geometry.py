@@ -7,6 +7,7 @@ yaw of the zyx sequence: ``R = Rz(yaw) Ry(pitch) Rx(roll)``.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -139,7 +140,7 @@ def signed_margin(point: FloatArray, polygon: FloatArray) -> float:
         if np.all(distance >= 0.0):
             return float(distance.min())
     corners = np.vstack([polygon, polygon[:1]])
-    return -min(_segment_distance(point, a, b) for a, b in zip(corners[:-1], corners[1:], strict=True))
+    return -min(_segment_distance(point, a, b) for a, b in itertools.pairwise(corners))
 
 
 def _half_hull(points: list[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -7,7 +7,14 @@ import math
 import numpy as np
 
 from bluefoot_mpc.geometry import rotation_from_rpy
-from bluefoot_mpc.model.legs import AnkleConfig, AnkleTable, LegGeometry, ankle_directions, inverse
+from bluefoot_mpc.model.legs import (
+    AnkleConfig,
+    AnkleTable,
+    IkResult,
+    LegGeometry,
+    ankle_directions,
+    inverse,
+)
 from bluefoot_mpc.types import FloatArray, PostureReference
 
 START_TIME = 1.0
@@ -32,24 +39,31 @@ class JointTargets:
         """Forget where the joints were found."""
         self._found: FloatArray | None = None
         self._elapsed = 0.0
+        self._beyond: frozenset[int] = frozenset()
+
+    def reach(self, reference: PostureReference) -> IkResult:
+        """Joints for a wanted trunk and feet, and what stands against them."""
+        rotation = rotation_from_rpy(reference.trunk_rpy)
+        feet = (reference.foot_position - reference.trunk_position) @ rotation
+        gamma = ankle_directions(self._geometry, self._ankle, feet, rotation[2], table=self._table)
+        return inverse(self._geometry, feet, gamma)
 
     def step(
         self, reference: PostureReference, joints: FloatArray, dt: float
     ) -> tuple[FloatArray, tuple[str, ...]]:
-        """(16,) rad, joint goals, and what had to be cut to reach them.
+        """(16,) rad, joint goals, and which limits began to cut them on this tick.
 
         Args:
             reference: wanted trunk and feet.
             joints: (16,) rad, measured joints; only the first tick's are used.
             dt: s.
         """
-        rotation = rotation_from_rpy(reference.trunk_rpy)
-        feet = (reference.foot_position - reference.trunk_position) @ rotation
-        gamma = ankle_directions(self._geometry, self._ankle, feet, rotation[2], table=self._table)
-        result = inverse(self._geometry, feet, gamma)
+        result = self.reach(reference)
         # Two ufuncs: np.clip takes three times as long on a few numbers.
         goal = np.minimum(np.maximum(result.joints, self._geometry.lower), self._geometry.upper)
-        events = tuple(violation.describe() for violation in result.violations)
+        beyond = frozenset(violation.index for violation in result.violations)
+        new, self._beyond = beyond - self._beyond, beyond
+        events = tuple(v.describe() for v in result.violations if v.index in new)
         return self._soften(goal, joints, dt), events
 
     def _soften(self, goal: FloatArray, joints: FloatArray, dt: float) -> FloatArray:

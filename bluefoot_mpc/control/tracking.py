@@ -23,7 +23,7 @@ class TrackingConfig:
     """Gains and bounds of the corrections."""
 
     velocity_gain: float = 0.4  # 1/s
-    velocity_bound: float = 0.025  # m/s, largest correction
+    velocity_bound: float = 0.04  # m/s, largest correction
     heading_gain: float = 0.8  # 1/s
     heading_bound: float = 0.15  # rad/s, largest correction
     yaw_integral_gain: float = 0.3  # 1/s², slow part of the heading correction

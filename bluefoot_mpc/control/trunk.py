@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from bluefoot_mpc.control import posture
 from bluefoot_mpc.control.posture import PostureConfig
 from bluefoot_mpc.gait.gait import GaitOutput
-from bluefoot_mpc.model.legs import LegGeometry, joint_positions_in_base
+from bluefoot_mpc.model.legs import IkResult, LegGeometry, joint_positions_in_base
 from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.types import BodyState, BoolArray, FloatArray, MotionCommand, PostureReference
 from bluefoot_mpc.zmp import placement
@@ -23,11 +25,18 @@ class TrunkPlanner:
         trunk_height: m, nominal height of the trunk origin over the foot points.
         config: offsets, rates and trims.
         zmp: the placement law.
+        reach: inverse kinematics, to refuse poses that the legs cannot hold.
     """
 
     def __init__(
-        self, parameters: RobotParameters, trunk_height: float, config: PostureConfig, zmp: PlacementConfig
+        self,
+        parameters: RobotParameters,
+        trunk_height: float,
+        config: PostureConfig,
+        zmp: PlacementConfig,
+        reach: Callable[[PostureReference], IkResult],
     ) -> None:
+        self._reach = reach
         self._geometry = LegGeometry.from_parameters(parameters)
         self._masses = lump(parameters)
         self._height = trunk_height
@@ -40,12 +49,16 @@ class TrunkPlanner:
         self._pose = np.zeros(6)
         self._trim = np.zeros(2)
         self._placement = np.zeros(2)
+        self._held = False
         self.position = np.array([self._config.trunk_forward, 0.0, self._height])
 
     def step(
         self, gait: GaitOutput, motion: MotionCommand, estimate: BodyState, sit_level: float, dt: float
-    ) -> tuple[PostureReference, FloatArray]:
-        """The wanted trunk and feet, and the (2,) ZMP that the placement law assumes.
+    ) -> tuple[PostureReference, FloatArray, tuple[str, ...]]:
+        """The wanted trunk and feet, the (2,) ZMP that the placement law assumes, and events.
+
+        A commanded offset that the legs cannot hold is not followed: the trunk
+        stays at the last pose on the way that they can.
 
         Args:
             gait: feet in b' and the gait's phase.
@@ -55,24 +68,44 @@ class TrunkPlanner:
             dt: s.
         """
         config = self._config
-        self._pose = posture.follow_pose(self._pose, motion.trunk, dt, config)
-        error = estimate.rpy[:2] - self._pose[3:5]
         if sit_level == 0.0:
-            self._trim = posture.trim_level(self._trim, error, dt, config)
+            self._trim = posture.trim_level(self._trim, estimate.rpy[:2] - self._pose[3:5], dt, config)
         zmp = self._place(gait, estimate, dt)
         height = self._height * (1.0 - sit_level * (1.0 - config.sit_height_share))
-        x, y, z, roll, pitch, yaw = self._pose.tolist()
+        events = self._follow(gait, motion, height, dt)
+        reference = self._reference(gait, self._pose, height)
+        self.position = reference.trunk_position
+        return reference, zmp, events
+
+    def _follow(self, gait: GaitOutput, motion: MotionCommand, height: float, dt: float) -> tuple[str, ...]:
+        """Move the offset towards the commanded one, as far as the legs can hold it."""
+        wanted = posture.follow_pose(self._pose, motion.trunk, dt, self._config)
+        if wanted is self._pose or np.array_equal(wanted, self._pose):
+            self._held = False
+            return ()
+        result = self._reach(self._reference(gait, wanted, height))
+        if result.feasible or self._is_closer_to_neutral(wanted):
+            self._pose, self._held = wanted, False
+            return ()
+        if self._held:
+            return ()
+        self._held = True
+        return (f"trunk pose held, the one commanded is out of reach: {'; '.join(result.describe())}",)
+
+    def _is_closer_to_neutral(self, wanted: FloatArray) -> bool:
+        # The way back must never be barred, whatever the feet do meanwhile.
+        return float(np.abs(wanted).sum()) < float(np.abs(self._pose).sum())
+
+    def _reference(self, gait: GaitOutput, pose: FloatArray, height: float) -> PostureReference:
+        x, y, z, roll, pitch, yaw = pose.tolist()
         shift_x, shift_y = self._placement.tolist()
         trim_roll, trim_pitch = self._trim.tolist()
-        self.position = np.array([x + config.trunk_forward + shift_x, y + shift_y, z + height])
-        rpy = np.array([roll + trim_roll, pitch + trim_pitch, yaw])
-        reference = PostureReference(
-            trunk_position=self.position,
-            trunk_rpy=rpy,
+        return PostureReference(
+            trunk_position=np.array([x + self._config.trunk_forward + shift_x, y + shift_y, z + height]),
+            trunk_rpy=np.array([roll + trim_roll, pitch + trim_pitch, yaw]),
             foot_position=gait.foot_position,
             swing=gait.phase.swing,
         )
-        return reference, zmp
 
     def _place(self, gait: GaitOutput, estimate: BodyState, dt: float) -> FloatArray:
         law = self._zmp

@@ -118,7 +118,8 @@ def run_battery(
         if progress is not None:
             progress(case, seed)
     return [
-        Verdict(case=case, figures={seed: store.get(case, seed) or {} for seed in case.seeds}) for case in cases
+        Verdict(case=case, figures={seed: store.get(case, seed) or {} for seed in case.seeds})
+        for case in cases
     ]
 
 

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.settings import require_positive
 from bluefoot_mpc.sim.config import SimConfig
 from bluefoot_mpc.types import MotionCommand
@@ -59,6 +61,13 @@ class Scenario(ABC):
     def prepare(self, sim: SimConfig) -> SimConfig:
         """The simulator's configuration for this scenario; by default unchanged."""
         return sim
+
+    def check(self, robot: RobotModel, control: ControlConfig) -> None:  # noqa: B027 - optional
+        """Refuse a configuration that this robot cannot do; by default nothing is refused.
+
+        Raises:
+            ConfigurationError: the scenario asks for the impossible.
+        """
 
     def criteria(self, summary: Mapping[str, Any]) -> list[Criterion]:
         """The conditions of success, judged from the run's summary."""

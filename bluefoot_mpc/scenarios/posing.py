@@ -9,9 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from bluefoot_mpc.control import posture
+from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.control.targets import JointTargets
+from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.scenarios.base import Criterion, Scenario, ScenarioConfig, at_most, not_fallen
 from bluefoot_mpc.settings import require_nonnegative, require_positive
-from bluefoot_mpc.types import FloatArray, MotionCommand, TrunkPose
+from bluefoot_mpc.types import FloatArray, MotionCommand, PostureReference, TrunkPose
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -67,6 +72,10 @@ class PoseConfig(ScenarioConfig):
         return np.array([self.forward, self.sideways, self.height, *angles])
 
 
+AXES = ("forward", "sideways", "height", "roll_deg", "pitch_deg", "yaw_deg")
+"""Fields of `PoseConfig` in the order of the axes."""
+
+
 class Pose(Scenario):
     """Move the trunk through its range of motion over planted feet."""
 
@@ -84,6 +93,29 @@ class Pose(Scenario):
         offset[min(5, int(axis))] = math.sin(2.0 * math.pi * within)
         offset *= config.amplitudes()
         return MotionCommand(trunk=TrunkPose(position=offset[:3], rpy=offset[3:]))
+
+    def check(self, robot: RobotModel, control: ControlConfig) -> None:
+        """Refuse amplitudes that the planted feet do not allow.
+
+        Raises:
+            ConfigurationError: an extreme pose is out of reach; says which and why.
+        """
+        stance = posture.stance(robot.parameters.stance, control.posture)
+        targets = JointTargets(robot.geometry, control.ankle)
+        for axis, amplitude in enumerate(self.config.amplitudes()):
+            for sign in (1.0, -1.0):
+                pose = np.zeros(6)
+                pose[axis] = sign * amplitude
+                reference = PostureReference(
+                    trunk_position=pose[:3] + np.array([0.0, 0.0, stance.trunk_height]), trunk_rpy=pose[3:],
+                    foot_position=stance.feet, swing=np.zeros(4, dtype=np.bool_),
+                )  # fmt: skip
+                result = targets.reach(reference)
+                if not result.feasible:
+                    value = getattr(self.config, AXES[axis])
+                    raise ConfigurationError(
+                        f"{AXES[axis]} = {value:g} is out of reach: {'; '.join(result.describe())}"
+                    )
 
     def window(self) -> tuple[float, float]:
         """The whole motion: the command never rests."""

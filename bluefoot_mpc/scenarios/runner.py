@@ -89,9 +89,12 @@ def simulate(name_or_path: str, options: RunOptions) -> RunResult:
     """
     resolved = resolve(find_scenario(name_or_path), options)
     model = RobotModel(resolved.parameters)
+    resolved.scenario.check(model, resolved.stages.control)
     simulator = SimRobot(model, resolved.stages.sim, resolved.run.seed)
     table = {**resolved.table(), "drawn": simulator.drawn}
-    data = _drive(simulator, model, resolved, resolved.scenario.source, LoopHooks(truth=simulator.truth), table)
+    data = _drive(
+        simulator, model, resolved, resolved.scenario.source, LoopHooks(truth=simulator.truth), table
+    )
     return _judge(data, resolved, model, Path())
 
 
@@ -104,6 +107,7 @@ def run_commanded(source: CommandSource, resolved: Resolved, options: RunOptions
         options: output folder, view and report.
     """
     model = RobotModel(resolved.parameters)
+    resolved.scenario.check(model, resolved.stages.control)
     simulator = SimRobot(model, resolved.stages.sim, resolved.run.seed)
     table = {**resolved.table(), "drawn": simulator.drawn}
     folder = _make_folder(options, resolved.run.scenario)

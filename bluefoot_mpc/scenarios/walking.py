@@ -35,7 +35,9 @@ class WalkConfig(ScenarioConfig):
         require_nonnegative(stand_time=self.stand_time)
         for name, limit in (("speed", 0.5), ("lateral_speed", 0.3), ("yaw_rate", 1.5)):
             if not abs(getattr(self, name)) <= limit:
-                raise ConfigurationError(f"{name} = {getattr(self, name)!r} is beyond what the robot can do (±{limit:g})")
+                raise ConfigurationError(
+                    f"{name} = {getattr(self, name)!r} is beyond what the robot can do (±{limit:g})"
+                )
 
 
 def motion(config: WalkConfig) -> MotionCommand:

@@ -51,7 +51,8 @@ def test_a_fall_makes_it_limp_at_once_and_for_good():
 
 
 @pytest.mark.parametrize(
-    ("level", "mode"), [(SafetyLevel.HOLD, Mode.STAND), (SafetyLevel.SIT, Mode.SIT), (SafetyLevel.STOP, Mode.SAFE)]
+    ("level", "mode"),
+    [(SafetyLevel.HOLD, Mode.STAND), (SafetyLevel.SIT, Mode.SIT), (SafetyLevel.STOP, Mode.SAFE)],
 )
 def test_the_supervisor_overrules_the_operator(level, mode):
     safety = SafetyRequest(level=level, reasons=("because",))

@@ -15,8 +15,10 @@ def make_frame(time=0.0, **changes):
         magnetometer=np.zeros((0, 3)), valid=np.zeros(0, dtype=bool),
     )  # fmt: skip
     frame = SensorFrame(
-        time=time, joint_position=np.zeros(16), joint_speed=np.zeros(16), joint_load=np.zeros(16),
-        joint_temperature=np.full(16, 30.0), joint_time=np.full(16, time), joint_valid=np.ones(16, dtype=bool),
+        time=time,
+        joint_position=np.zeros(16), joint_speed=np.zeros(16), joint_load=np.zeros(16),
+        joint_temperature=np.full(16, 30.0), joint_time=np.full(16, time),
+        joint_valid=np.ones(16, dtype=bool),
         voltage=12.0, voltage_valid=True, imu=imu, contact=np.ones(4, dtype=bool),
         contact_time=np.full(4, time), contact_valid=np.ones(4, dtype=bool),
     )  # fmt: skip

@@ -53,7 +53,9 @@ def scripted_walk(seconds: float = 9.0, yaw_rate: float = 0.0, heading: float = 
         since_lift_off = ((time - START) / CYCLE - LAGS) % 1.0
         swing = (since_lift_off < 0.4) & walks
         # Positive while the leg swings, rising through zero at lift-off.
-        y2 = np.where(since_lift_off < 0.7, np.minimum(since_lift_off, 0.4 - since_lift_off), since_lift_off - 1.0)
+        y2 = np.where(
+            since_lift_off < 0.7, np.minimum(since_lift_off, 0.4 - since_lift_off), since_lift_off - 1.0
+        )
         run.telemetry[k] = replace(
             run.telemetry[k],
             mode=motion.mode,
