@@ -68,6 +68,9 @@ class SimRobot:
         windows = self._steps // self._imu_steps + 1
         self._inertial = InertialWindows(robot.parameters.sensors.imu, config.sensors.imu_period, windows)
         self._sensed = np.zeros((windows, 15))
+        world, data = self._world, self._world.data
+        self._sensor = data.sensordata[world.sensor : world.sensor + 15]
+        self._pose, self._twist = data.qpos[world.q : world.q + 7], data.qvel[world.v : world.v + 6]
         self._commands: deque[tuple[int, JointCommand]] = deque()
         self._pushes: list[tuple[int, int, FloatArray]] = []
         self._frame = self.reset()
@@ -105,8 +108,7 @@ class SimRobot:
         # Standing still is simulated before time zero, the last command period with sensors.
         settle = max(1, math.ceil(self.config.settle_time / self.config.command_period)) * self._steps
         self._step = -settle
-        data, q, v = self._world.data, self._world.q, self._world.v
-        self._inertial.begin(data.qpos[q : q + 7], data.qvel[v : v + 6])
+        self._inertial.begin(self._pose, self._twist)
         self._next_event = _NEVER
         while self._step < 0:
             self._bank.cool()
@@ -180,7 +182,7 @@ class SimRobot:
         self._truth.start_frame()
         times = self._advance()
         dt, now = self.config.physics_period, self._step * self.config.physics_period
-        if not math.isfinite(self._world.data.qpos[self._world.q + 2]):
+        if not math.isfinite(self._pose[2]):
             raise DeviceError(f"the simulation became unstable before t = {now:.3f} s")
         count = len(times)
         sensed = self._sensed[:count]
@@ -215,10 +217,8 @@ class SimRobot:
         Returns:
             Times of the samples in the first rows of the sample buffer, s.
         """
-        model, data, world = self._world.model, self._world.data, self._world
+        model, data = self._world.model, self._world.data
         option, advance, mj_step = model.opt, self._bank.advance, mujoco.mj_step
-        sensed = data.sensordata[world.sensor : world.sensor + 15]
-        pose, twist = data.qpos[world.q : world.q + 7], data.qvel[world.v : world.v + 6]
         flags = option.disableflags & ~_SENSORS_OFF
         times: list[float] = []
         option.disableflags = flags | _SENSORS_OFF
@@ -233,8 +233,8 @@ class SimRobot:
             option.disableflags = flags
             mj_step(model, data)
             option.disableflags = flags | _SENSORS_OFF
-            self._inertial.mark(len(times), pose, twist)
-            self._sensed[len(times)] = sensed
+            self._inertial.mark(len(times), self._pose, self._twist)
+            self._sensed[len(times)] = self._sensor
             self._truth.look_for_contacts()
             times.append((step + 1) * self.config.physics_period)
         self._step += self._steps

@@ -87,6 +87,7 @@ class ServoBank:
         self._limit = np.zeros(N_JOINTS)
         self._live = np.zeros(N_JOINTS)
         self._wanted_limit = np.zeros(N_JOINTS)
+        self._asked_limit: list[float] = []
         self._shut_down: BoolArray = np.zeros(N_JOINTS, dtype=np.bool_)
         self._sums = np.zeros(N_JOINTS + 2)
         # Winding loss of a motor torque, W/(N·m)².
@@ -102,6 +103,7 @@ class ServoBank:
         self._ramp[:] = _NO_RAMP
         self._live[:] = 0.0
         self._shut_down[:] = False
+        self._asked_limit = [0.0] * N_JOINTS
         self.cool()
         self._apply_limits()
 
@@ -120,22 +122,20 @@ class ServoBank:
         """Take goal, moving speed and torque limit as the registers would hold them."""
         servo = self.config.servo
         self.goal[:] = law.to_counts(servo, command.position)
-        if command.speed.any():
+        if any(command.speed.tolist()):
             ramp = law.quantise_speed_limit(command.speed) * (self.config.period / servo.step_angle)
             self._ramp[:] = np.where(ramp > 0.0, ramp, _NO_RAMP)
         else:
             self._ramp[:] = _NO_RAMP
+        asked: list[float] = command.torque_limit.tolist()
+        if asked == self._asked_limit and not self._shut_down.any():
+            return
+        self._asked_limit = asked
         limit = np.minimum(np.maximum(command.torque_limit, 0.0), 1.0)
-        np.floor(limit * law.FULL_DUTY, out=limit)
-        limit /= law.FULL_DUTY
-        if self._shut_down.any():
-            # A servo works again only when it has cooled and its limit is written anew.
-            self._shut_down &= self.temperature >= law.SHUTDOWN_TEMPERATURE
-            self._wanted_limit[:] = limit
-            self._apply_limits()
-        elif not np.array_equal(limit, self._wanted_limit):
-            self._wanted_limit[:] = limit
-            self._apply_limits()
+        self._wanted_limit[:] = np.floor(limit * law.FULL_DUTY) / law.FULL_DUTY
+        # A servo works again only when it has cooled and its limit is written anew.
+        self._shut_down &= self.temperature >= law.SHUTDOWN_TEMPERATURE
+        self._apply_limits()
 
     @property
     def overheated(self) -> tuple[str, ...]:
@@ -151,11 +151,12 @@ class ServoBank:
         mean = self._sums / steps
         loss = self._loss * mean[:N_JOINTS]
         self.temperature[:] = law.heat(self.config.servo, self.temperature, loss, steps * self.config.period)
-        if self.temperature.max() >= law.SHUTDOWN_TEMPERATURE:
+        if max(self.temperature.tolist()) >= law.SHUTDOWN_TEMPERATURE:
             self._shut_down |= self.temperature >= law.SHUTDOWN_TEMPERATURE
             self._apply_limits()
-        self._sums[:] = 0.0
-        return float(mean[N_JOINTS]), float(mean[N_JOINTS + 1])
+        self._sums.fill(0.0)
+        power, voltage = mean[N_JOINTS:].tolist()
+        return power, voltage
 
     def _apply_limits(self) -> None:
         """Bring torque limits into force, and with them which servos are live or limp."""

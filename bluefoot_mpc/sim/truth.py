@@ -24,6 +24,7 @@ class TruthReader:
         self._world, self._ground, self._radius = world, ground, foot_radius
         self._feet = list(world.foot_geoms)
         self._touched: set[str] = set()
+        self._harmless = {geom for geom, name in enumerate(world.body_of_part) if not name}
 
     def start_frame(self) -> None:
         """Forget what was touched in the last frame."""
@@ -33,8 +34,9 @@ class TruthReader:
         """Note which bodies other than feet touch the world in this physics step."""
         data = self._world.data
         if data.ncon > 0:
-            names = self._world.body_of_part
-            self._touched.update(names[geom] for geom in data.contact.geom.ravel().tolist() if names[geom])
+            others = set(data.contact.geom.ravel().tolist()) - self._harmless
+            if others:
+                self._touched.update(self._world.body_of_part[geom] for geom in others)
 
     def read(self, time: float, bank: ServoBank, force: FloatArray) -> TruthSample:
         """The truth at the end of the last physics step; contact forces are that step's.
