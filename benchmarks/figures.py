@@ -23,9 +23,18 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from bluefoot_mpc.evaluation.battery import Store, Verdict, run_battery, source_hash
 from bluefoot_mpc.evaluation.cases import BATTERIES, battery
-from bluefoot_mpc.evaluation.tables import as_plain, limits_table, walking_table
+from bluefoot_mpc.evaluation.tables import (
+    as_plain,
+    limits_table,
+    readme_section,
+    replace_between,
+    walking_table,
+)
 from bluefoot_mpc.exceptions import BlueFootError
 from bluefoot_mpc.runtime.versions import installed_versions
+
+
+MARKS = ("<!-- figures:begin", "<!-- figures:end")
 
 
 def main() -> int:
@@ -36,6 +45,9 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("figures.json"))
     parser.add_argument("--store", type=Path, default=Path("runs/figures.jsonl"))
     parser.add_argument("--workers", type=int, default=None, help="processes; one per core by default")
+    parser.add_argument(
+        "--readme", type=Path, help="write the table into this file, between its figures marks"
+    )
     options = parser.parse_args()
     console = Console()
     try:
@@ -50,6 +62,10 @@ def main() -> int:
             else limits_table(verdicts)
         )
         console.print(Markdown(f"## {name}\n\n{text}") if console.is_terminal else f"\n## {name}\n\n{text}")
+    if options.readme:
+        text = options.readme.read_text(encoding="utf-8")
+        section = readme_section(found)
+        options.readme.write_text(replace_between(text, section, *MARKS), encoding="utf-8")
     return 0 if all(verdict.passed for verdicts in found.values() for verdict in verdicts) else 1
 
 

@@ -74,7 +74,8 @@ class Store:
         if self._path is not None:
             self._path.parent.mkdir(parents=True, exist_ok=True)
             with self._path.open("ab") as file:
-                file.write(orjson.dumps({"key": key, "figures": figures}) + b"\n")
+                # The newline comes first: a line that a killed job cut off spoils only itself.
+                file.write(b"\n" + orjson.dumps({"key": key, "figures": figures}))
 
     def _read(self, line: bytes) -> None:
         try:

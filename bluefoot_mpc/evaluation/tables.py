@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bluefoot_mpc.evaluation.battery import Verdict
+from bluefoot_mpc.exceptions import ConfigurationError
 
 WALKING_COLUMNS = {
     "falls": "falls", "speed_mmps": "speed mm/s", "drift_percent": "drift %", "clearance_mm": "clearance mm",
@@ -76,6 +77,42 @@ def limits_table(verdicts: Sequence[Verdict]) -> str:
             kept = "yes" if verdict.holds(limit) else "NO"
             lines.append(f"| {verdict.case.name} | {limit.figure} | {limit.describe()} | {shown} | {kept} |")
     return "\n".join(lines)
+
+
+def battery_line(name: str, verdicts: Sequence[Verdict]) -> str:
+    """One sentence about a battery: how many runs, how many falls, the worst of each other limit."""
+    runs = [figures for verdict in verdicts for figures in verdict.figures.values()]
+    falls = sum(figures.get("falls") or 0.0 for figures in runs)
+    parts = [f"{len(runs)} runs, {falls:.0f} falls"]
+    limits = {limit.figure: limit for verdict in verdicts for limit in verdict.case.limits}
+    for figure, limit in limits.items():
+        values = [figures.get(figure) for figures in runs]
+        known = [value for value in values if value is not None]
+        if figure != "falls" and known and len(known) == len(values):
+            worst = max(known) if limit.side == "max" else min(known)
+            parts.append(f"{figure} at worst {worst:.2f} (limit {limit.describe()})")
+    return f"- {name}: {', '.join(parts)}"
+
+
+def readme_section(batteries: Mapping[str, Sequence[Verdict]]) -> str:
+    """What the README shows of the figures: the walking table and a line for each other battery."""
+    parts = [walking_table(batteries["walking"])] if "walking" in batteries else []
+    lines = [battery_line(name, verdicts) for name, verdicts in batteries.items() if name != "walking"]
+    return "\n\n".join([*parts, "\n".join(lines)]).strip()
+
+
+def replace_between(text: str, section: str, begin: str, end: str) -> str:
+    """`text` with everything between the lines that hold the two marks replaced by `section`.
+
+    Raises:
+        ConfigurationError: a mark is missing.
+    """
+    head, mark, rest = text.partition(begin)
+    first_line, _, rest = rest.partition("\n")
+    _, closing, tail = rest.partition(end)
+    if not mark or not closing:
+        raise ConfigurationError(f"the marks '{begin}' and '{end}' are not there, in this order")
+    return f"{head}{mark}{first_line}\n{section}\n{closing}{tail}"
 
 
 def _cell(verdict: Verdict, figure: str) -> str:
