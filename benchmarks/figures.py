@@ -33,7 +33,6 @@ from bluefoot_mpc.evaluation.tables import (
 from bluefoot_mpc.exceptions import BlueFootError
 from bluefoot_mpc.runtime.versions import installed_versions
 
-
 MARKS = ("<!-- figures:begin", "<!-- figures:end")
 
 

@@ -42,7 +42,7 @@ def test_a_battery_goes_on_where_it_stopped(calls, tmp_path):
     path = tmp_path / "store.jsonl"
     Store(path).put(CASE, 1, made_up(CASE, 1))
     with path.open("ab") as file:
-        file.write(b'{"key": "cut o')  # killed in the middle of a line
+        file.write(b'\n{"key": "cut o')  # killed in the middle of a line
     (verdict,) = run_battery([CASE], Store(path), workers=1)
     assert calls == [0, 2]
     assert verdict.figures[1]["clearance_mm"] == 8.0
