@@ -21,6 +21,7 @@ import numpy as np
 from bluefoot_mpc.control.pipeline import ControlOutput
 from bluefoot_mpc.io.safety import SafetySupervisor
 from bluefoot_mpc.runtime.data import COMPLETED, CommandRecord, RunData
+from bluefoot_mpc.runtime.garbage import YoungCollection
 from bluefoot_mpc.runtime.recorder import Recorder
 from bluefoot_mpc.types import (
     N_JOINTS,
@@ -94,10 +95,11 @@ def run_loop(
     """
     data = RunData(period=robot.period, config=config)
     started = time.perf_counter()
-    with _interruptible() as interrupted:
+    with _interruptible() as interrupted, YoungCollection() as garbage:
         try:
             frame = robot.reset()
             controller.reset()
+            hooks = replace(hooks, observers=(*hooks.observers, lambda *_: garbage.tick()))
             data.stop_reason = _ticks(robot, controller, source, hooks, data, frame, interrupted)
         finally:
             robot.stop()
@@ -138,10 +140,11 @@ def _ticks(
             _ramp_down(robot, frame)
             return f"controller error: {type(error).__name__}: {error}"
         tick_us = (time.perf_counter_ns() - tick_start) * 1e-3
-        output = replace(output, telemetry=replace(output.telemetry, tick_us=tick_us))
+        telemetry = replace(output.telemetry, tick_us=tick_us)
+        output = ControlOutput(command=output.command, telemetry=telemetry)
         _record(data, hooks, frame, motion, safety, output)
         frame = robot.step(output.command)
-        mode, limp = output.telemetry.mode, not bool(output.command.torque_limit.any())
+        mode, limp = telemetry.mode, not any(output.command.torque_limit.tolist())
         if mode is Mode.SAFE:
             stopping_since = min(stopping_since, now)
             if limp and now - stopping_since >= AFTER_FALL:
