@@ -55,14 +55,15 @@ class Stack:
     def run(self, observers=(), prepare=None):
         """One run, recorded to a file that is thrown away."""
         table = self.resolved.table()
-        with tempfile.TemporaryDirectory() as folder:
-            with Recorder(Path(folder) / "log.mcap", table) as self.recorder:
-                if prepare is not None:
-                    prepare(self)
-                hooks = LoopHooks(
-                    recorder=self.recorder, truth=self.simulator.truth, observers=tuple(observers)
-                )
-                return run_loop(self.supervisor, self.pipeline, self.resolved.scenario.source, hooks, table)
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            Recorder(Path(folder) / "log.mcap", table) as self.recorder,
+        ):
+            if prepare is not None:
+                prepare(self)
+            truth = self.simulator.truth
+            hooks = LoopHooks(recorder=self.recorder, truth=truth, observers=tuple(observers))
+            return run_loop(self.supervisor, self.pipeline, self.resolved.scenario.source, hooks, table)
 
 
 def record_physics(resolved):
