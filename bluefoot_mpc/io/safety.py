@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -82,13 +82,13 @@ class SafetySupervisor:
         self._last: JointCommand | None = None
         self._voltage = math.nan
         self._silent_share = 0.0
-        self._position = np.zeros(N_JOINTS)
+        self._position = np.full(N_JOINTS, np.nan)
 
     def reset(self) -> SensorFrame:
         """Reset the robot and forget every fault."""
         self._clear()
         frame = self.robot.reset()
-        self._position = frame.joint_position.copy()
+        self._locate(frame)
         return frame
 
     def step(self, command: JointCommand) -> SensorFrame:
@@ -100,12 +100,11 @@ class SafetySupervisor:
 
     def check(self, command: JointCommand) -> JointCommand:
         """The command that may be sent: finite, inside limits, slew-limited."""
-        previous = self._last
         if not (_finite(command.position) and _finite(command.speed) and _finite(command.torque_limit)):
             bad = [JOINTS[i] for i in np.flatnonzero(~_finite_joints(command))]
             self._latch(SafetyLevel.STOP, f"command is not finite for {', '.join(bad)}: discarded")
-            return previous if previous is not None else self._hold()
-        reference = self._position if previous is None else previous.position
+            return self._hold()
+        reference = self._reference(command)
         goal = _clip(command.position, reference - self._reach, reference + self._reach)
         goal = _clip(goal, self._lower, self._upper)
         limit = np.zeros(N_JOINTS) if self.stopped else _clip(command.torque_limit, 0.0, 1.0)
@@ -121,12 +120,28 @@ class SafetySupervisor:
         """Give back the robot's resources."""
         self.robot.close()
 
+    def _reference(self, command: JointCommand) -> FloatArray:
+        """(16,) rad, where goals are limited from: the last ones, at first where the joints are."""
+        if self._last is not None:
+            return self._last.position
+        # Of a servo that has not answered yet nothing is known: its first goal goes as it is.
+        return np.where(np.isnan(self._position), command.position, self._position)
+
     def _hold(self) -> JointCommand:
+        """What is sent instead of a command that cannot be: the last one, at first where the joints are."""
+        if self._last is not None:
+            return replace(self._last, torque_limit=np.zeros(N_JOINTS)) if self.stopped else self._last
+        unknown = np.isnan(self._position)
         return JointCommand(
-            position=_clip(self._position, self._lower, self._upper),
+            position=_clip(np.where(unknown, 0.0, self._position), self._lower, self._upper),
             speed=np.zeros(N_JOINTS),
-            torque_limit=np.ones(N_JOINTS),
+            # A servo that is somewhere unknown stays limp: to hold it would be to move it.
+            torque_limit=np.where(unknown | self.stopped, 0.0, 1.0),
         )
+
+    def _locate(self, frame: SensorFrame) -> None:
+        answered = frame.joint_valid & np.isfinite(frame.joint_position)
+        self._position = np.where(answered, frame.joint_position, self._position)
 
     def _latch(self, level: SafetyLevel, reason: str) -> None:
         if all(known != reason for _, known in self._latched):
@@ -145,8 +160,8 @@ class SafetySupervisor:
         config = self._config
         # Lists: going through sixteen numbers costs less than one call of numpy.
         valid: list[bool] = frame.joint_valid.tolist()
-        if all(valid):
-            self._position = frame.joint_position
+        if self._last is None:
+            self._locate(frame)
         self._watch_voltage(frame)
         temperature: list[float] = frame.joint_temperature.tolist()
         hot = [i for i, value in enumerate(temperature) if value >= config.temperature_sit]

@@ -101,6 +101,55 @@ def test_reset_forgets_every_fault(supervisor):
     assert supervisor.request.level is SafetyLevel.NONE
 
 
+def test_a_servo_that_did_not_answer_is_not_slewed_from_nowhere(fake):
+    valid = np.ones(16, dtype=bool)
+    valid[3] = False
+    position = np.where(valid, 0.1, np.nan)
+    fake.next = make_frame(joint_valid=valid, joint_position=position)
+    made = SafetySupervisor(fake, np.full(16, -1.0), np.full(16, 1.0), SafetyConfig())
+    made.reset()
+    made.step(goal(np.nan))
+    held = fake.sent[-1]
+    np.testing.assert_array_equal(held.position, np.where(valid, 0.1, 0.0))
+    np.testing.assert_array_equal(held.torque_limit, np.where(valid, 1.0, 0.0))
+    made.step(goal(0.9))
+    expected = np.where(valid, 0.1 + SafetyConfig().max_goal_rate * 0.02, 0.9)
+    np.testing.assert_allclose(fake.sent[-1].position, expected)
+
+
+def test_goals_are_limited_from_where_the_joints_were_found(fake):
+    fake.next = make_frame(joint_position=np.full(16, -0.5))
+    made = SafetySupervisor(fake, np.full(16, -1.0), np.full(16, 1.0), SafetyConfig())
+    made.reset()
+    made.step(goal(0.9))
+    np.testing.assert_allclose(fake.sent[-1].position, -0.5 + SafetyConfig().max_goal_rate * 0.02)
+
+
+@pytest.mark.parametrize("first", [0.1, np.nan])
+def test_nothing_that_comes_after_a_stop_gives_torque_back(supervisor, fake, first):
+    supervisor.step(goal(first))
+    supervisor.stop()
+    for value in (np.nan, 0.1, np.nan):
+        supervisor.step(goal(value))
+        np.testing.assert_array_equal(fake.sent[-1].torque_limit, 0.0)
+
+
+def test_torque_limits_and_speeds_are_kept_in_range(supervisor, fake):
+    supervisor.step(replace(goal(0.1, torque=3.0), speed=np.full(16, -2.0)))
+    np.testing.assert_array_equal(fake.sent[-1].torque_limit, 1.0)
+    np.testing.assert_array_equal(fake.sent[-1].speed, 0.0)
+    supervisor.step(goal(0.1, torque=-1.0))
+    np.testing.assert_array_equal(fake.sent[-1].torque_limit, 0.0)
+
+
+def test_a_voltage_that_is_unknown_counts_for_nothing(supervisor, fake):
+    for frame in (make_frame(voltage=np.nan), make_frame(voltage=3.0, voltage_valid=False)):
+        fake.next = frame
+        for _ in range(500):
+            supervisor.step(goal(0.0))
+    assert supervisor.request.level is SafetyLevel.NONE
+
+
 def test_stop_latches_the_torque_off(supervisor, fake):
     supervisor.stop()
     supervisor.step(goal(0.1))
