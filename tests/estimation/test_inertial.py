@@ -34,9 +34,12 @@ def batch(time: list[float], gyro: np.ndarray | None = None, accel: np.ndarray |
 
 def test_quaternions_agree_with_the_shared_geometry():
     rng = np.random.default_rng(1)
-    a, b = (tuple(quaternion_from_rpy(rng.uniform(-1, 1, 3))) for _ in range(2))
+    first, second = (quaternion_from_rpy(rng.uniform(-1, 1, 3)) for _ in range(2))
+    a, b = tuple(first.tolist()), tuple(second.tolist())
     product = rotation_matrix(quaternion_product(a, b))
-    np.testing.assert_allclose(product, rotation_from_quaternion(a) @ rotation_from_quaternion(b), atol=1e-14)
+    np.testing.assert_allclose(
+        product, rotation_from_quaternion(first) @ rotation_from_quaternion(second), atol=1e-14
+    )
     x = rng.normal(size=3)
     np.testing.assert_allclose(rotated(a, *x), rotation_matrix(a) @ x, atol=1e-14)
 
