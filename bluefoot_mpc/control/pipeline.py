@@ -7,12 +7,12 @@ placement -> inverse kinematics -> joint goals.
 from __future__ import annotations
 
 import math
-import time as clock
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bluefoot_mpc.control import modes, posture, tracking
+from bluefoot_mpc.control.command import usable
 from bluefoot_mpc.control.config import ControlConfig
 from bluefoot_mpc.control.targets import JointTargets
 from bluefoot_mpc.control.trunk import TrunkPlanner
@@ -28,11 +28,12 @@ from bluefoot_mpc.types import (
     JointCommand,
     Mode,
     MotionCommand,
-    PostureReference,
     SafetyRequest,
     SensorFrame,
     Telemetry,
 )
+
+BLIND = "the estimate is not to be trusted: the robot does not walk on"
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -61,10 +62,8 @@ class Pipeline:
         self._estimator = Estimator(geometry, replace(config.estimator, imu=imu))
         self._gait = Gait(config.gait, stance.feet)
         self._targets = JointTargets(geometry, config.ankle)
-        self._trunk = TrunkPlanner(
-            robot.parameters, stance.trunk_height, config.posture, config.zmp, self._targets.reach
-        )
-        self._require_reachable(stance)
+        self._trunk = TrunkPlanner(robot.parameters, stance, config.posture, config.zmp, self._targets.reach)
+        self._require_reachable()
         self.reset()
 
     def reset(self) -> None:
@@ -75,6 +74,8 @@ class Pipeline:
         self._targets.reset()
         self._modes = modes.ModeState()
         self._tracking = tracking.TrackingState()
+        self._wanted = MotionCommand()
+        self._notices: tuple[str, ...] = ()
         self._walking = False
 
     def step(
@@ -87,44 +88,61 @@ class Pipeline:
             motion: what the operator or script wants.
             safety: what the supervisor asked for on the previous tick.
         """
-        start = clock.perf_counter_ns()
         dt = self.period
         estimate = self._estimator.step(frame)
-        roll, pitch, _ = estimate.rpy.tolist()
-        tilt = rotation_from_rpy(np.array([roll, pitch, 0.0]))
-        before = self._modes
-        self._modes = modes.advance(
-            before, motion.mode, safety or SafetyRequest(), self._walking,
-            math.degrees(math.acos(min(1.0, float(tilt[2, 2])))), dt, self.config.modes,
-        )  # fmt: skip
-        motion = self._in_force(motion, estimate)
-        twist = self._corrected(motion, estimate, tilt)
-        gait = self._gait.step(self._gait_inputs(twist, motion, estimate, tilt), dt)
+        upright = self._rotation_base_to_virtual(estimate)
+        self._wanted, faults = usable(motion, self._wanted)
+        begun = self._begun(faults if estimate.healthy else (*faults, BLIND))
+        changed = self._advance_mode(safety or SafetyRequest(), float(upright[2, 2]))
+        motion = self._in_force(self._wanted, estimate)
+        twist = self._corrected(motion, estimate, upright)
+        gait = self._gait.step(self._gait_inputs(twist, motion, estimate, upright), dt)
         self._walking = gait.phase.walking
         reference, zmp, held = self._trunk.step(gait, motion, estimate, self._modes.sit_level, dt)
-        joints, cut = self._targets.step(reference, frame.joint_position, dt)
-        events = held + cut
+        joints, cut = self._targets.step(reference, frame, dt)
         command = JointCommand(
             position=joints, speed=np.zeros(N_JOINTS), torque_limit=np.full(N_JOINTS, self._modes.torque)
         )
-        if self._modes.mode is not before.mode:
-            events = (*events, f"mode {before.mode} -> {self._modes.mode} {self._modes.reason}".rstrip())
         telemetry = Telemetry(
-            time=frame.time, mode=self._modes.mode, estimate=estimate, phase=gait.phase, reference=reference,
-            motion=motion,
-            zmp=zmp, events=events,
-            tick_us=(clock.perf_counter_ns() - start) * 1e-3,
+            time=frame.time, mode=self._modes.mode, motion=motion, estimate=estimate, phase=gait.phase,
+            reference=reference, zmp=zmp, events=begun + held + cut + changed,
         )  # fmt: skip
         return ControlOutput(command=command, telemetry=telemetry)
 
-    def _require_reachable(self, stance: posture.Stance) -> None:
-        level = PostureReference(
-            trunk_position=np.array([self.config.posture.trunk_forward, 0.0, stance.trunk_height]),
-            trunk_rpy=np.zeros(3), foot_position=stance.feet, swing=np.zeros(4, dtype=np.bool_),
-        )  # fmt: skip
-        result = self._targets.reach(level)
+    def _rotation_base_to_virtual(self, estimate: BodyState) -> FloatArray:
+        """(3, 3) rotation from the base frame to b': estimated tilt, commanded yaw of the trunk."""
+        roll, pitch, _ = estimate.rpy.tolist()
+        return rotation_from_rpy(np.array([roll, pitch, self._trunk.yaw]))
+
+    def _advance_mode(self, safety: SafetyRequest, upright: float) -> tuple[str, ...]:
+        """Let the mode follow command, supervisor and tilt (`upright` is its cosine); says what changed."""
+        before = self._modes
+        tilt_deg = math.degrees(math.acos(min(1.0, upright)))
+        # Nobody knows in which posture the robot was found: it stands up before it walks.
+        found = self._wanted.mode is Mode.WALK and not self._targets.started
+        self._modes = modes.advance(
+            before,
+            Mode.STAND if found else self._wanted.mode,
+            safety,
+            self._walking,
+            tilt_deg,
+            self.period,
+            self.config.modes,
+        )
+        if self._modes.mode is before.mode:
+            return ()
+        return (f"mode {before.mode} -> {self._modes.mode} {self._modes.reason}".rstrip(),)
+
+    def _require_reachable(self) -> None:
+        result = self._targets.reach(self._trunk.over_stance(np.zeros(6)))
         if not result.feasible:
             raise ConfigurationError(f"the stance is out of reach: {'; '.join(result.describe())}")
+
+    def _begun(self, notices: tuple[str, ...]) -> tuple[str, ...]:
+        """Those notices that did not hold on the tick before."""
+        new = tuple(notice for notice in notices if notice not in self._notices)
+        self._notices = notices
+        return new
 
     def _in_force(self, motion: MotionCommand, estimate: BodyState) -> MotionCommand:
         """The command, without its motion where the robot must not walk: other modes, or a blind estimate."""
@@ -133,25 +151,29 @@ class Pipeline:
             return motion
         return MotionCommand(mode=motion.mode, gait=motion.gait, trunk=motion.trunk)
 
-    def _corrected(self, motion: MotionCommand, estimate: BodyState, tilt: FloatArray) -> tracking.Twist:
+    def _corrected(self, motion: MotionCommand, estimate: BodyState, upright: FloatArray) -> tracking.Twist:
         """The commanded twist, corrected by odometry while walking."""
         wanted = tracking.Twist(velocity=motion.velocity, yaw_rate=motion.yaw_rate)
         if motion.yaw_rate == 0.0 and not any(motion.velocity.tolist()):
             self._tracking = tracking.rest(self._tracking)
             return wanted
-        horizontal = tilt @ estimate.linear_velocity
-        measured = tracking.Twist(velocity=horizontal[:2], yaw_rate=float(estimate.angular_velocity[2]))
+        velocity = upright @ estimate.linear_velocity
+        # The virtual robot's heading: the trunk's, less the yaw that it was told to have over the feet.
+        heading = float(estimate.rpy[2]) - self._trunk.yaw
         self._tracking, twist = tracking.advance(
-            self._tracking, wanted, measured, float(estimate.rpy[2]), self.period, self.config.tracking
+            self._tracking, wanted, velocity[:2], heading, self.period, self.config.tracking
         )
         return twist
 
     def _gait_inputs(
-        self, twist: tracking.Twist, motion: MotionCommand, estimate: BodyState, tilt: FloatArray
+        self, twist: tracking.Twist, motion: MotionCommand, estimate: BodyState, upright: FloatArray
     ) -> GaitInputs:
-        feet = estimate.foot_position_in_base @ tilt.T + self._trunk.position
-        rates = tilt @ estimate.angular_velocity
+        error = (upright @ estimate.angular_velocity)[:2] - self._trunk.tilt_rate
         return GaitInputs(
             velocity=twist.velocity, yaw_rate=twist.yaw_rate, gait=motion.gait, contact=estimate.contact,
-            foot_position=feet, tilt_rate_error=rates[:2], halt=self._modes.mode is Mode.SAFE,
+            foot_position=estimate.foot_position_in_base @ upright.T + self._trunk.position,
+            trunk_position=self._trunk.position,
+            # No reflex on a rate that is no longer measured.
+            tilt_rate_error=error if estimate.healthy else np.zeros(2),
+            halt=self._modes.mode is Mode.SAFE,
         )  # fmt: skip

@@ -22,7 +22,7 @@ class PostureConfig:
     stance_x: float | None = None  # m, foot from the trunk centre, forward
     stance_y: float | None = None  # m, foot from the trunk centre, sideways
     trunk_forward: float = 0.0  # m, trunk origin ahead of the middle of the feet
-    sit_height_share: float = 0.6  # of the trunk height, when sitting
+    sit_height_share: float = 0.4  # of the trunk height, when sitting; the belly hangs 15 mm above the floor
     max_rate: float = 0.08  # m/s, commanded trunk translation
     max_turn_rate: float = 0.6  # rad/s, commanded trunk rotation
     max_offset: float = 0.12  # m, each axis of a commanded offset

@@ -15,7 +15,7 @@ from bluefoot_mpc.model.legs import (
     ankle_directions,
     inverse,
 )
-from bluefoot_mpc.types import FloatArray, PostureReference
+from bluefoot_mpc.types import FloatArray, PostureReference, SensorFrame
 
 START_TIME = 1.0
 """s over which the joints go from where they were found to where they are wanted."""
@@ -41,6 +41,11 @@ class JointTargets:
         self._elapsed = 0.0
         self._beyond: frozenset[int] = frozenset()
 
+    @property
+    def started(self) -> bool:
+        """Whether the joints have left the posture in which they were found."""
+        return self._elapsed >= START_TIME
+
     def reach(self, reference: PostureReference) -> IkResult:
         """Joints for a wanted trunk and feet, and what stands against them."""
         rotation = rotation_from_rpy(reference.trunk_rpy)
@@ -49,13 +54,13 @@ class JointTargets:
         return inverse(self._geometry, feet, gamma)
 
     def step(
-        self, reference: PostureReference, joints: FloatArray, dt: float
+        self, reference: PostureReference, frame: SensorFrame, dt: float
     ) -> tuple[FloatArray, tuple[str, ...]]:
         """(16,) rad, joint goals, and which limits began to cut them on this tick.
 
         Args:
             reference: wanted trunk and feet.
-            joints: (16,) rad, measured joints; only the first tick's are used.
+            frame: where the joints are; only the first frame is used.
             dt: s.
         """
         result = self.reach(reference)
@@ -64,13 +69,15 @@ class JointTargets:
         beyond = frozenset(violation.index for violation in result.violations)
         new, self._beyond = beyond - self._beyond, beyond
         events = tuple(v.describe() for v in result.violations if v.index in new)
-        return self._soften(goal, joints, dt), events
-
-    def _soften(self, goal: FloatArray, joints: FloatArray, dt: float) -> FloatArray:
         if self._found is None:
-            self._found = joints.copy()
+            # A servo that did not answer is taken to be where it is wanted.
+            known = frame.joint_valid & np.isfinite(frame.joint_position)
+            self._found = np.where(known, frame.joint_position, goal)
+        return self._soften(goal, self._found, dt), events
+
+    def _soften(self, goal: FloatArray, found: FloatArray, dt: float) -> FloatArray:
         self._elapsed += dt
         if self._elapsed >= START_TIME:
             return goal
         share = 0.5 - 0.5 * math.cos(math.pi * self._elapsed / START_TIME)
-        return self._found + share * (goal - self._found)
+        return found + share * (goal - found)

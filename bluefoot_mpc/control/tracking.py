@@ -60,14 +60,14 @@ class Twist:
 
 
 def advance(
-    state: TrackingState, wanted: Twist, measured: Twist, yaw: float, dt: float, config: TrackingConfig
+    state: TrackingState, wanted: Twist, measured: FloatArray, yaw: float, dt: float, config: TrackingConfig
 ) -> tuple[TrackingState, Twist]:
     """The new memory and the corrected twist.
 
     Args:
         state: memory of the corrections.
         wanted: commanded twist.
-        measured: estimated twist of the trunk.
+        measured: (2,) m/s, estimated velocity, forward and left in the heading frame.
         yaw: rad, estimated heading in the odometry frame.
         dt: s.
         config: gains and bounds.
@@ -75,7 +75,7 @@ def advance(
     heading = yaw if math.isnan(state.heading) else wrap_angle(state.heading + wanted.yaw_rate * dt)
     error = wrap_angle(heading - yaw)
     gain, bound = config.velocity_gain * dt, config.velocity_bound
-    axes = zip(state.velocity.tolist(), wanted.velocity.tolist(), measured.velocity.tolist(), strict=True)
+    axes = zip(state.velocity.tolist(), wanted.velocity.tolist(), measured.tolist(), strict=True)
     velocity = np.array([min(max(slow + gain * (goal - seen), -bound), bound) for slow, goal, seen in axes])
     limit = config.heading_bound
     slow = min(limit, max(-limit, state.yaw_rate + config.yaw_integral_gain * error * dt))

@@ -2,27 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 
 from bluefoot_mpc.control import posture
-from bluefoot_mpc.control.posture import PostureConfig
+from bluefoot_mpc.control.posture import PostureConfig, Stance
+from bluefoot_mpc.control.sway import Sway
 from bluefoot_mpc.gait.gait import GaitOutput
-from bluefoot_mpc.model.legs import IkResult, LegGeometry, joint_positions_in_base
+from bluefoot_mpc.model.legs import IkResult
 from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.types import BodyState, BoolArray, FloatArray, MotionCommand, PostureReference
-from bluefoot_mpc.zmp import placement
-from bluefoot_mpc.zmp.mass_points import lump
 from bluefoot_mpc.zmp.placement import PlacementConfig
+
+_PLANTED: BoolArray = np.zeros(4, dtype=np.bool_)
 
 
 class TrunkPlanner:
     """Plans the trunk's pose over the feet, in the robot-relative frame b'.
 
+    Attributes:
+        position: (3,) m, the trunk origin that was last wanted, in b'.
+        yaw: rad, the trunk's commanded yaw in b'.
+        tilt_rate: (2,) rad/s, commanded angular velocity about x and y of b'.
+
     Args:
         parameters: the robot.
-        trunk_height: m, nominal height of the trunk origin over the foot points.
+        stance: nominal feet and height of the trunk.
         config: offsets, rates and trims.
         zmp: the placement law.
         reach: inverse kinematics, to refuse poses that the legs cannot hold.
@@ -31,26 +38,26 @@ class TrunkPlanner:
     def __init__(
         self,
         parameters: RobotParameters,
-        trunk_height: float,
+        stance: Stance,
         config: PostureConfig,
         zmp: PlacementConfig,
         reach: Callable[[PostureReference], IkResult],
     ) -> None:
         self._reach = reach
-        self._geometry = LegGeometry.from_parameters(parameters)
-        self._masses = lump(parameters)
-        self._height = trunk_height
+        self._stance = stance
         self._config = config
-        self._zmp = zmp
+        self._sway = Sway(parameters, zmp, lambda pose: reach(self.over_stance(pose)).joints)
         self.reset()
 
     def reset(self) -> None:
         """Forget every offset."""
         self._pose = np.zeros(6)
         self._trim = np.zeros(2)
-        self._placement = np.zeros(2)
+        self._sway.reset()
         self._held = False
-        self.position = np.array([self._config.trunk_forward, 0.0, self._height])
+        self.position = self.over_stance(self._pose).trunk_position
+        self.yaw = 0.0
+        self.tilt_rate = np.zeros(2)
 
     def step(
         self, gait: GaitOutput, motion: MotionCommand, estimate: BodyState, sit_level: float, dt: float
@@ -68,14 +75,29 @@ class TrunkPlanner:
             dt: s.
         """
         config = self._config
-        if sit_level == 0.0:
+        # A blind estimate goes on from its last attitude: integrating it would tilt the trunk for real.
+        if sit_level == 0.0 and estimate.healthy:
             self._trim = posture.trim_level(self._trim, estimate.rpy[:2] - self._pose[3:5], dt, config)
-        zmp = self._place(gait, estimate, dt)
-        height = self._height * (1.0 - sit_level * (1.0 - config.sit_height_share))
+        zmp = self._sway.step(gait, estimate.joint_position, self.position, dt)
+        height = self._stance.trunk_height * (1.0 - sit_level * (1.0 - config.sit_height_share))
+        before = self._pose
         events = self._follow(gait, motion, height, dt)
+        if self._pose is not before:
+            self._sway.follow(self._pose)
+        self.tilt_rate = _tilt_rate(before, self._pose, dt)
         reference = self._reference(gait, self._pose, height)
-        self.position = reference.trunk_position
+        self.position, self.yaw = reference.trunk_position, float(self._pose[5])
         return reference, zmp, events
+
+    def over_stance(self, pose: FloatArray) -> PostureReference:
+        """The reference of a (6,) commanded offset over the nominal stance."""
+        x, y, z = pose[:3].tolist()
+        return PostureReference(
+            trunk_position=np.array([x + self._config.trunk_forward, y, z + self._stance.trunk_height]),
+            trunk_rpy=pose[3:],
+            foot_position=self._stance.feet,
+            swing=_PLANTED,
+        )
 
     def _follow(self, gait: GaitOutput, motion: MotionCommand, height: float, dt: float) -> tuple[str, ...]:
         """Move the offset towards the commanded one, as far as the legs can hold it."""
@@ -98,7 +120,7 @@ class TrunkPlanner:
 
     def _reference(self, gait: GaitOutput, pose: FloatArray, height: float) -> PostureReference:
         x, y, z, roll, pitch, yaw = pose.tolist()
-        shift_x, shift_y = self._placement.tolist()
+        shift_x, shift_y = self._sway.offset.tolist()
         trim_roll, trim_pitch = self._trim.tolist()
         return PostureReference(
             trunk_position=np.array([x + self._config.trunk_forward + shift_x, y + shift_y, z + height]),
@@ -107,22 +129,13 @@ class TrunkPlanner:
             swing=gait.phase.swing,
         )
 
-    def _place(self, gait: GaitOutput, estimate: BodyState, dt: float) -> FloatArray:
-        law = self._zmp
-        if not law.enabled:
-            return np.full(2, np.nan)
-        # The law is quasi-static and its rotations are small: legs are taken in
-        # the trunk's axes, relative to the trunk's neutral place.
-        points = joint_positions_in_base(self._geometry, estimate.joint_position)
-        com = placement.centre_of_mass(self._masses, self._masses.trunk_com, points)
-        zmp = placement.static_zmp(self._masses, com, points, self._swing_ahead(gait)) + self._placement
-        force = placement.boundary_force(self.position, gait.foot_position, law)
-        self._placement = placement.advance(self._placement, zmp, force, self._masses, dt, law)
-        return zmp
 
-    def _swing_ahead(self, gait: GaitOutput) -> BoolArray:
-        """(4,) True where a leg will swing after the law's lead time, at the present rhythm."""
-        if not gait.phase.walking:
-            return np.zeros(4, dtype=np.bool_)
-        ahead = (gait.phase.phase + self._zmp.lead / gait.cycle_time) % 1.0
-        return np.asarray(ahead < gait.swing_share)
+def _tilt_rate(before: FloatArray, after: FloatArray, dt: float) -> FloatArray:
+    """(2,) rad/s, horizontal angular velocity in b' of a trunk that goes from one (6,) pose to the next."""
+    if before is after:
+        return np.zeros(2)
+    roll_rate, pitch_rate, _ = ((after[3:] - before[3:]) / dt).tolist()
+    _, pitch, yaw = after[3:].tolist()
+    along = math.cos(pitch) * roll_rate
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array([c * along - s * pitch_rate, s * along + c * pitch_rate])

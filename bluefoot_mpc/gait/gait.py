@@ -153,7 +153,9 @@ class Gait:
             places = [foot.in_b(state.pose) for foot in state.feet]
         else:
             places = [place for place, _ in estimates]
-        return reflex(error, places, contact, self.config.reflex)
+        trunk_x, trunk_y, _ = inputs.trunk_position.tolist()
+        trunk = complex(trunk_x, trunk_y)
+        return reflex(error, [place - trunk for place in places], contact, self.config.reflex)
 
     def _check_contacts(
         self,

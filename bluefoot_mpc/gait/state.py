@@ -25,8 +25,9 @@ class GaitInputs:
         gait: name of the wanted gait.
         contact: (4,) True where the foot touches.
         foot_position: (4, 3) m, estimated feet in b', or None when unknown.
+        trunk_position: (3,) m, trunk origin in b'; its height is not used.
         tilt_rate_error: (2,) rad/s, estimated minus wanted angular velocity
-            about x and y of the heading frame.
+            about x and y of b'.
         halt: True ends the gait at once: feet in the air land, then all rest.
     """
 
@@ -35,6 +36,7 @@ class GaitInputs:
     gait: str = "trot"
     contact: BoolArray = field(default_factory=lambda: np.ones(4, dtype=np.bool_))
     foot_position: FloatArray | None = None
+    trunk_position: FloatArray = field(default_factory=lambda: np.zeros(3))
     tilt_rate_error: FloatArray = field(default_factory=lambda: np.zeros(2))
     halt: bool = False
 

@@ -11,13 +11,11 @@ def test_speed_error_is_integrated_away_within_its_bound():
     state, speed = TrackingState(), 0.0
     wanted = Twist(velocity=np.array([0.06, 0.0]), yaw_rate=0.0)
     for _ in range(2000):
-        measured = Twist(velocity=np.array([speed, 0.0]), yaw_rate=0.0)
-        state, corrected = tracking.advance(state, wanted, measured, 0.0, 0.02, CONFIG)
+        state, corrected = tracking.advance(state, wanted, np.array([speed, 0.0]), 0.0, 0.02, CONFIG)
         speed = 0.85 * corrected.velocity[0]
     assert speed == pytest.approx(0.06, rel=1e-3)
     for _ in range(5000):
-        lost = Twist(velocity=np.zeros(2), yaw_rate=0.0)
-        state, corrected = tracking.advance(state, wanted, lost, 0.0, 0.02, CONFIG)
+        state, corrected = tracking.advance(state, wanted, np.zeros(2), 0.0, 0.02, CONFIG)
     assert corrected.velocity[0] == pytest.approx(0.06 + CONFIG.velocity_bound)
 
 
@@ -25,10 +23,10 @@ def test_speed_error_is_integrated_away_within_its_bound():
 def test_heading_is_held_across_the_wrap(start):
     state, yaw = TrackingState(), start
     twist = Twist(velocity=np.zeros(2), yaw_rate=0.0)
-    state, _ = tracking.advance(state, twist, twist, yaw, 0.02, CONFIG)
+    state, _ = tracking.advance(state, twist, np.zeros(2), yaw, 0.02, CONFIG)
     yaw += 0.2
     for _ in range(3000):
-        state, corrected = tracking.advance(state, twist, twist, yaw, 0.02, CONFIG)
+        state, corrected = tracking.advance(state, twist, np.zeros(2), yaw, 0.02, CONFIG)
         yaw += (corrected.yaw_rate + 0.01) * 0.02  # a constant disturbance
     assert yaw == pytest.approx(start, abs=1e-3)
 
@@ -37,7 +35,7 @@ def test_the_heading_reference_turns_with_the_command():
     state = TrackingState(heading=0.0)
     wanted = Twist(velocity=np.zeros(2), yaw_rate=0.5)
     for i in range(50):
-        state, corrected = tracking.advance(state, wanted, wanted, 0.5 * 0.02 * (i + 1), 0.02, CONFIG)
+        state, corrected = tracking.advance(state, wanted, np.zeros(2), 0.5 * 0.02 * (i + 1), 0.02, CONFIG)
     assert state.heading == pytest.approx(0.5)
     assert corrected.yaw_rate == pytest.approx(0.5, abs=1e-6)
 
@@ -46,7 +44,7 @@ def test_corrections_stay_bounded_when_the_estimate_is_wrong():
     state = TrackingState(heading=0.0)
     still = Twist(velocity=np.zeros(2), yaw_rate=0.0)
     for _ in range(5000):
-        state, corrected = tracking.advance(state, still, still, 1.5, 0.02, CONFIG)
+        state, corrected = tracking.advance(state, still, np.zeros(2), 1.5, 0.02, CONFIG)
     assert abs(corrected.yaw_rate) <= CONFIG.heading_bound + 1e-12
 
 

@@ -1,0 +1,39 @@
+"""What of a command may be used: numbers that are not finite must not reach the laws."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from bluefoot_mpc.types import MotionCommand
+
+
+def usable(motion: MotionCommand, previous: MotionCommand) -> tuple[MotionCommand, tuple[str, ...]]:
+    """The command with what is not finite replaced, and what a person should know of that.
+
+    A speed that is not a number is no speed: the robot comes to rest. A trunk
+    offset that is none leaves the trunk where it was told to be before.
+
+    Args:
+        motion: the command as it came.
+        previous: the usable command of the tick before.
+    """
+    events: tuple[str, ...] = ()
+    moving, posed = _has_finite_twist(motion), _has_finite_pose(motion)
+    if not moving:
+        motion = replace(motion, velocity=np.zeros(2), yaw_rate=0.0)
+        events = ("velocity command is not finite: taken as zero",)
+    if not posed:
+        motion = replace(motion, trunk=previous.trunk)
+        events = (*events, "trunk command is not finite: the last one is kept")
+    return motion, events
+
+
+def _has_finite_twist(motion: MotionCommand) -> bool:
+    return math.isfinite(sum(motion.velocity.tolist()) + motion.yaw_rate)
+
+
+def _has_finite_pose(motion: MotionCommand) -> bool:
+    return math.isfinite(sum(motion.trunk.position.tolist()) + sum(motion.trunk.rpy.tolist()))
