@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
-from bluefoot_mpc.types import N_LEGS, BoolArray, FloatArray
+from bluefoot_mpc.types import N_LEGS, BoolArray
 
 
 class SwitchState(NamedTuple):
@@ -16,15 +14,17 @@ class SwitchState(NamedTuple):
     Attributes:
         contact: (4,) debounced switches.
         since_edge: (4,) s since the last accepted edge.
+        closed: (4,) switches that are closed both as measured and debounced.
     """
 
-    contact: BoolArray
-    since_edge: FloatArray
+    contact: tuple[bool, ...]
+    since_edge: tuple[float, ...]
+    closed: tuple[bool, ...]
 
 
 def initial_switches() -> SwitchState:
     """All feet in the air, ready for any edge."""
-    return SwitchState(np.zeros(N_LEGS, dtype=bool), np.full(N_LEGS, math.inf))
+    return SwitchState((False,) * N_LEGS, (math.inf,) * N_LEGS, (False,) * N_LEGS)
 
 
 def advance_switches(
@@ -41,6 +41,14 @@ def advance_switches(
         dt: s since the previous call.
         debounce: s during which an edge back is refused.
     """
-    since = state.since_edge + dt
-    edge = ((contact & valid) != state.contact) & (since > debounce)
-    return SwitchState(state.contact ^ edge, np.where(edge, 0.0, since))
+    values: list[bool] = []
+    times: list[float] = []
+    closed: list[bool] = []
+    rows = zip(contact.tolist(), valid.tolist(), state.contact, state.since_edge, strict=True)
+    for touches, works, value, since in rows:
+        now, time = touches and works, since + dt
+        edge = now != value and time > debounce
+        values.append(now if edge else value)
+        times.append(0.0 if edge else time)
+        closed.append(now and (edge or value))
+    return SwitchState(tuple(values), tuple(times), tuple(closed))

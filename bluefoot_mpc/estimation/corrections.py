@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import functools
+from typing import Any
+
+import casadi as ca
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from bluefoot_mpc.estimation.filter import FEET, VELOCITY, FilterState, IndexArray
-from bluefoot_mpc.estimation.inertial import quaternion_product, rotation_matrix, small_quaternion
+from bluefoot_mpc.estimation import symbols
+from bluefoot_mpc.estimation.filter import SIZE, VALUES, VELOCITY, FilterState, IndexArray
+from bluefoot_mpc.estimation.workspace import Workspace, compile_function
 from bluefoot_mpc.types import N_LEGS, FloatArray
-
-_BLOCK_ROWS = FEET.reshape(N_LEGS, 3, 1)
-_BLOCK_COLUMNS = FEET.reshape(N_LEGS, 1, 3)
 
 
 def correct(state: FilterState, index: IndexArray, residual: FloatArray, noise: FloatArray) -> FilterState:
@@ -24,11 +26,30 @@ def correct(state: FilterState, index: IndexArray, residual: FloatArray, noise: 
     """
     covariance = state.covariance
     rows = covariance[index]
-    _, gain, failed = dposv(rows[:, index] + noise, rows)
-    if failed:  # rounding has made the covariance indefinite: leave this measurement out
-        return state
+    change, reduced = reduce(covariance, rows, rows[:, index] + noise, residual)
+    return state if change is None else shifted(state, change, reduced)
+
+
+def reduce(
+    covariance: FloatArray, rows: FloatArray, spread: FloatArray, residual: FloatArray
+) -> tuple[FloatArray | None, FloatArray]:
+    """What measurements of some components leave to be known.
+
+    Args:
+        covariance: (26, 26) before.
+        rows: (m, 26) of it, of the components measured.
+        spread: (m, m) covariance of the residual.
+        residual: (m,) measured minus estimated.
+
+    Returns:
+        (26,) correction, or None where rounding has made the covariance
+        indefinite and the measurement must be left out, and (26, 26) covariance after.
+    """
+    _, gain, failed = dposv(spread, rows)
+    if failed:
+        return None, covariance
     reduced = covariance - rows.T @ gain
-    return shifted(state, residual @ gain, 0.5 * (reduced + reduced.T))
+    return residual @ gain, 0.5 * (reduced + reduced.T)
 
 
 def correct_scalar(state: FilterState, row: FloatArray, residual: float, variance: float) -> FilterState:
@@ -46,78 +67,128 @@ def correct_scalar(state: FilterState, row: FloatArray, residual: float, varianc
     return shifted(state, (-residual * scale) * spread, reduced)
 
 
+class Settler:
+    """Workspace that corrects estimates; holds no memory of them."""
+
+    def __init__(self) -> None:
+        self._work = Workspace(_settling())
+        self.no_points = np.zeros(3 * N_LEGS)
+
+    def settle(
+        self, estimate: FloatArray, change: FloatArray | float, points: FloatArray, others: list[int]
+    ) -> FloatArray:
+        """The estimate moved by a correction, with some feet taken up anew.
+
+        Args:
+            estimate: (27,) before.
+            change: (26,) correction, or 0.
+            points: (12,) m, feet by the joints, relative to the IMU, base frame.
+            others: feet that are placed there.
+
+        Returns:
+            (27,) after.
+        """
+        before, moved, seen, anew = self._work.inputs
+        before[:] = estimate
+        moved[:] = change
+        seen[:] = points
+        anew[:] = 0.0
+        for leg in others:
+            anew[leg] = 1.0
+        self._work.call()
+        return self._work.outputs[0].copy()
+
+
 def shifted(state: FilterState, change: FloatArray, covariance: FloatArray) -> FilterState:
     """The state moved by a (26,) correction, with a new covariance."""
-    c: list[float] = change.tolist()
-    turn = small_quaternion(c[0], c[1], c[2])
-    matrix = rotation_matrix(turn)
-    moved = np.concatenate((np.array((state.velocity,)), state.feet)) @ matrix.T + change[3:18].reshape(5, 3)
-    velocity = moved[0].tolist()
-    (gx, gy, gz), (ax, ay, az), (hx, hy) = state.gyro_bias, state.accel_bias, state.hard_iron
-    return FilterState(
-        quaternion_product(turn, state.quaternion),
-        (velocity[0], velocity[1], velocity[2]),
-        moved[1:],
-        (gx + c[18], gy + c[19], gz + c[20]),
-        (ax + c[21], ay + c[22], az + c[23]),
-        (hx + c[24], hy + c[25]),
-        covariance,
+    settler = Settler()
+    return FilterState(settler.settle(state.estimate, change, settler.no_points, []), covariance)
+
+
+@functools.lru_cache(maxsize=1)
+def _settling() -> Any:
+    """Correction of an estimate (immutable, so it may be shared)."""
+    before, change = ca.SX.sym("before", VALUES), ca.SX.sym("change", SIZE)
+    points, anew = ca.SX.sym("points", 3 * N_LEGS), ca.SX.sym("anew", N_LEGS)
+    turn = symbols.small_quaternion(change[0:3])
+    quaternion = symbols.quaternion_product(turn, before[0:4])
+    matrix, rotation = symbols.rotation_matrix(turn), symbols.rotation_matrix(quaternion)
+    feet = []
+    for leg in range(N_LEGS):
+        k = 3 * leg
+        kept = matrix @ before[7 + k : 10 + k] + change[6 + k : 9 + k]
+        feet.append(ca.if_else(anew[leg], rotation @ points[k : k + 3], kept))
+    after = ca.vertcat(quaternion, matrix @ before[4:7] + change[3:6], *feet, before[19:] + change[18:])
+    return compile_function(
+        "settling", {"before": before, "change": change, "points": points, "anew": anew}, {"after": after}
     )
 
 
-def plant_feet(state: FilterState, legs: list[int], feet: FloatArray, noise: FloatArray) -> FilterState:
-    """Forget some feet and take them up anew where the kinematics see them.
+def plant_feet(covariance: FloatArray, legs: list[int], noise: FloatArray) -> None:
+    """Forget, in place, what a covariance says of some feet that are taken up anew.
 
     Args:
-        state: before.
+        covariance: (26, 26), changed.
         legs: indices of the feet.
-        feet: (4, 3) m, measured, relative to the IMU, world axes.
-        noise: (4, 3, 3) m², its covariances.
+        noise: (12, 12) m², covariance of all feet as measured, world axes.
     """
-    if not legs:
-        return state
-    covariance = state.covariance.copy()
-    points = state.feet.copy()
     for leg in legs:
-        rows = slice(6 + 3 * leg, 9 + 3 * leg)
-        covariance[rows, :] = 0.0
+        k = 3 * leg
+        rows = slice(6 + k, 9 + k)
+        covariance[rows] = 0.0
         covariance[:, rows] = 0.0
-        covariance[rows, rows] = noise[leg]
-        points[leg] = feet[leg]
-    return state._replace(feet=points, covariance=covariance)
+        covariance[rows, rows] = noise[k : k + 3, k : k + 3]
 
 
 def forget_velocity(state: FilterState, deviation: float) -> FilterState:
     """Velocity zero with a deviation (m/s), uncorrelated with the rest."""
-    covariance = state.covariance.copy()
+    estimate, covariance = state.estimate.copy(), state.covariance.copy()
+    estimate[4:7] = 0.0
     covariance[3:6, :] = 0.0
     covariance[:, 3:6] = 0.0
     covariance[VELOCITY, VELOCITY] = deviation**2
-    return state._replace(velocity=(0.0, 0.0, 0.0), covariance=covariance)
+    return FilterState(estimate, covariance)
 
 
-def distances(state: FilterState, residual: FloatArray, noise: FloatArray) -> list[float]:
-    """Squared Mahalanobis distance of each foot's residual.
-
-    Args:
-        state: before the correction.
-        residual: (4, 3) m.
-        noise: (4, 3, 3) m².
-    """
-    blocks: list[list[float]] = (
-        (state.covariance[_BLOCK_ROWS, _BLOCK_COLUMNS] + noise).reshape(-1, 9).tolist()
+@functools.lru_cache(maxsize=1)
+def _distances() -> Any:
+    spread, residual = ca.SX.sym("spread", 3 * N_LEGS, 3 * N_LEGS), ca.SX.sym("residual", 3 * N_LEGS)
+    values = []
+    for leg in range(N_LEGS):
+        part = slice(3 * leg, 3 * leg + 3)
+        values.append(_distance(spread[part, part], residual[part]))
+    return compile_function(
+        "distances", {"spread": spread, "residual": residual}, {"distances": ca.vertcat(*values)}
     )
-    rows: list[list[float]] = residual.tolist()
-    return [_distance(block, row) for block, row in zip(blocks, rows, strict=True)]
 
 
-def _distance(block: list[float], residual: list[float]) -> float:
-    """``residual @ inverse(block) @ residual`` for a symmetric 3 x 3 block, by its Cholesky factor."""
-    a, _, _, b, d, _, c, e, f = block
-    x, y, z = residual
-    x2 = x * x / a
+def _distance(block: Any, residual: Any) -> Any:
+    """``residual' inverse(block) residual`` for a symmetric 3 x 3 block, by its Cholesky factor."""
+    a, b, c, d, e, f = (block[i, j] for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)))
+    x, y, z = ca.vertsplit(residual)
     m, n = b / a, c / a
-    d, e, y = d - m * b, e - n * b, y - m * x
+    d, e, y_left = d - m * b, e - n * b, y - m * x
     o = e / d
-    z = z - n * x - o * y
-    return x2 + y * y / d + z * z / (f - n * c - o * e)
+    z_left = z - n * x - o * y_left
+    return x * x / a + y_left * y_left / d + z_left * z_left / (f - n * c - o * e)
+
+
+class Gate:
+    """Workspace that measures how well feet fit the filter; holds no memory."""
+
+    def __init__(self) -> None:
+        self._work = Workspace(_distances())
+
+    def distances(self, spread: FloatArray, residual: FloatArray) -> list[float]:
+        """Squared Mahalanobis distance of each foot's residual.
+
+        Args:
+            spread: (12, 12) m², covariance of the residual.
+            residual: (12,) m.
+        """
+        block, difference = self._work.inputs
+        block[:] = spread
+        difference[:] = residual
+        self._work.call()
+        values: list[float] = self._work.outputs[0].tolist()
+        return values

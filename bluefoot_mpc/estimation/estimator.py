@@ -9,44 +9,27 @@ import numpy as np
 
 from bluefoot_mpc.estimation.config import EstimatorConfig
 from bluefoot_mpc.estimation.contacts import SwitchState, advance_switches, initial_switches
-from bluefoot_mpc.estimation.corrections import plant_feet
-from bluefoot_mpc.estimation.filter import FilterState, frame_noise, initial_state, predict
+from bluefoot_mpc.estimation.filter import FilterState, initial_state
 from bluefoot_mpc.estimation.heading import HeadingReference, advance_heading
 from bluefoot_mpc.estimation.inertial import (
-    ZERO,
+    MOTION_SIZE,
     Motion,
     Sample,
-    integrate,
+    Strapdown,
     level_quaternion,
     mean_rate,
-    rotation_matrix,
     usable_samples,
 )
-from bluefoot_mpc.estimation.joints import (
-    JointState,
-    advance_joints,
-    initial_joints,
-    known_legs,
-)
-from bluefoot_mpc.estimation.odometry import (
-    OdometryState,
-    advance_position,
-    start_odometry,
-    trunk_height,
-)
+from bluefoot_mpc.estimation.joints import JointFilter, JointState, initial_joints
+from bluefoot_mpc.estimation.odometry import Odometry
+from bluefoot_mpc.estimation.prediction import Prediction, Predictor
 from bluefoot_mpc.estimation.rest import RestState, advance_rest, at_rest, correct_bias
-from bluefoot_mpc.estimation.stance import (
-    StanceState,
-    advance_stance,
-    measure_feet,
-    rolling,
-)
-from bluefoot_mpc.model.legs import LegGeometry, feet_in_base, foot_jacobians_in_base
+from bluefoot_mpc.estimation.stance import Stance, StanceState
+from bluefoot_mpc.model.legs import LegGeometry
 from bluefoot_mpc.types import N_LEGS, BodyState, FloatArray, SensorFrame
 
 BLIND_TILT = 0.3  # rad, deviation of a level start without any inertial sample
 FIRST_FRAME = 0.02  # s, samples this old belong to the first frame
-MAX_READ_DELAY = 0.03  # s, older joint readings are taken as they are
 MIN_KNOWN_LEGS = 3
 
 
@@ -55,25 +38,15 @@ class _Memory(NamedTuple):
 
     time: float
     joints: JointState
-    angles: FloatArray  # (16,) rad, as used at the last frame
     switches: SwitchState
     filter: FilterState
     stance: StanceState
     heading: HeadingReference
-    odometry: OdometryState
+    position: FloatArray  # (3,) m, IMU in the odometry frame
     rest: RestState
     sample: Sample | None
-    rate: tuple[float, float, float]  # rad/s, base frame, bias removed
+    rate: FloatArray  # (3,) rad/s, base frame, bias removed
     imu_age: float  # s since the last usable inertial sample
-
-
-class _Prediction(NamedTuple):
-    """The filter carried to a frame's time, before it sees that frame's feet."""
-
-    filter: FilterState
-    motion: Motion
-    roll: FloatArray  # (4, 3) m, way of the foot points by rolling, world axes
-    rotation: FloatArray  # (3, 3) rotation_base_to_world
 
 
 class Estimator:
@@ -90,10 +63,12 @@ class Estimator:
     """
 
     def __init__(self, geometry: LegGeometry, config: EstimatorConfig) -> None:
-        self._geometry = geometry
         self._config = config
-        self._mount = np.array(config.imu.mount)
-        self._azimuth: list[float] = geometry.hip_azimuth.tolist()
+        self._joints = JointFilter(config.joint)
+        self._strapdown = Strapdown()
+        self._predictor = Predictor(geometry, config)
+        self._stance = Stance(config.contact)
+        self._odometry = Odometry(config.imu.mount)
         self._memory: _Memory | None = None
 
     def reset(self) -> None:
@@ -103,7 +78,7 @@ class Estimator:
     @property
     def gyro_bias(self) -> FloatArray:
         """(3,) rad/s, estimated bias of the gyro in the base frame; zero before the first frame."""
-        return np.zeros(3) if self._memory is None else np.array(self._memory.filter.gyro_bias)
+        return np.zeros(3) if self._memory is None else self._memory.filter.estimate[19:22].copy()
 
     @property
     def covariance(self) -> FloatArray:
@@ -127,150 +102,99 @@ class Estimator:
         dt = math.nan if memory is None else frame.time - memory.time
         if memory is None or not 0.0 < dt <= self._config.max_step:
             return self._start(frame, memory)
-        joints, angles = self._read_joints(frame, memory.joints, dt)
+        config, start, end = self._config, memory.time, frame.time
+        joints, known = self._read_joints(frame, memory.joints, dt)
         switches = advance_switches(
-            memory.switches, frame.contact, frame.contact_valid, dt, self._config.contact.debounce
+            memory.switches, frame.contact, frame.contact_valid, dt, config.contact.debounce
         )
-        samples = usable_samples(frame.imu, memory.time, frame.time, memory.sample)
-        ahead = self._predict(memory, angles, samples, (memory.time, frame.time))
-        points = feet_in_base(self._geometry, angles)
-        closed = frame.contact & frame.contact_valid & switches.contact
-        standing: list[bool] = (closed & known_legs(joints, self._config.joint)).tolist()
-        state, stance, rest = self._correct(
-            memory, ahead, samples, standing=standing, angles=angles, points=points, dt=dt
-        )
+        samples = usable_samples(frame.imu, start, end, memory.sample)
+        before = memory.filter.estimate
+        motion = self._strapdown.advance(before[:7], before[19:25], samples, (start, end))
+        angles = (memory.rest.joints, memory.joints.newest, joints.newest)
+        ahead = self._predictor.advance(memory.filter, motion, angles, dt)
+        standing = [closed and answers > 0.0 for closed, answers in zip(switches.closed, known, strict=True)]
+        state, stance = self._stance.advance(ahead, memory.stance, standing, dt)
+        rest = advance_rest(memory.rest, ahead.moved, joints.newest, dt, config.rest)
+        if at_rest(rest, standing, samples, state, config.rest):
+            state = correct_bias(state, samples, config.rest)
         heading = memory.heading
-        if self._config.heading.enabled:
-            state, heading = advance_heading(state, heading, frame.imu, dt, self._config.heading)
-        odometry = advance_position(
-            memory.odometry, state.feet, ahead.roll, stance.used, ahead.motion.displacement
-        )
+        if config.heading.enabled:
+            state, heading = advance_heading(state, heading, frame.imu, dt, config.heading)
         sample, rate, age = memory.sample, memory.rate, memory.imu_age + dt
         if samples:
-            mean, bias = mean_rate(samples), state.gyro_bias
-            rate = (mean[0] - bias[0], mean[1] - bias[1], mean[2] - bias[2])
+            rate = np.array(mean_rate(samples)) - state.estimate[19:22]
             sample, age = samples[-1], 0.0
-        memory = _Memory(
-            frame.time, joints, angles, switches, state, stance, heading, odometry, rest, sample, rate, age
+        fresh = _Memory(
+            end, joints, switches, state, stance, heading, memory.position, rest, sample, rate, age
         )
-        return self._finish(memory, points)
+        return self._finish(fresh, ahead, known, before)
 
     def _start(self, frame: SensorFrame, memory: _Memory | None) -> BodyState:
         """First frame, or the first after a jump of the clock (then with what was known)."""
         config = self._config
-        joints, angles = self._read_joints(frame, initial_joints(), 0.0)
+        joints, known = self._read_joints(frame, initial_joints(), 0.0)
         switches = advance_switches(initial_switches(), frame.contact, frame.contact_valid, 0.0, 0.0)
         samples = usable_samples(frame.imu, frame.time - FIRST_FRAME, frame.time, None)
-        points = feet_in_base(self._geometry, angles)
         tilt = config.initial_tilt if samples else BLIND_TILT
         state = initial_state(level_quaternion(samples), tilt, config)
         if memory is not None:
             state = _doubtful(memory.filter, state)
-        rotation = rotation_matrix(state.quaternion)
-        feet = measure_feet(
-            rotation, points - self._mount, foot_jacobians_in_base(self._geometry, angles), config.contact
-        )
-        state = plant_feet(state, list(range(N_LEGS)), feet.points @ rotation.T, feet.noise)
-        if memory is None:
-            height = trunk_height(points @ rotation.T, switches.contact.tolist())
-            odometry = start_odometry(state.feet, height, rotation @ self._mount)
-        else:
-            odometry = OdometryState(memory.odometry.position, state.feet, ())
+        carried = np.zeros(MOTION_SIZE)
+        carried[:7] = state.estimate[:7]
+        ahead = self._predictor.advance(state, Motion(carried), (joints.newest,) * 3, 0.0)
+        state = self._stance.plant(state, ahead)
         fresh = _Memory(
-            frame.time, joints, angles, switches, state, StanceState(),
-            HeadingReference() if memory is None else memory.heading, odometry, RestState(angles, 0.0),
-            samples[-1] if samples else None, ZERO, 0.0 if memory is None else math.inf,
+            frame.time, joints, switches, state, StanceState(),
+            HeadingReference() if memory is None else memory.heading,
+            np.zeros(3) if memory is None else memory.position, RestState(joints.newest, 0.0),
+            samples[-1] if samples else None, np.zeros(3), 0.0 if memory is None else math.inf,
         )  # fmt: skip
-        return self._finish(fresh, points)
+        if memory is None:
+            # The trunk starts above the frame's origin: take off where it would be with the IMU there.
+            report = self._report(fresh, ahead, state.estimate)
+            fresh = fresh._replace(position=np.array((0.0, 0.0, report[19])) - report[3:6])
+        return self._finish(fresh, ahead, known, state.estimate)
 
-    def _read_joints(self, frame: SensorFrame, state: JointState, dt: float) -> tuple[JointState, FloatArray]:
+    def _read_joints(
+        self, frame: SensorFrame, state: JointState, dt: float
+    ) -> tuple[JointState, list[float]]:
         """Advance the joint filter; angles are carried from their reading to the frame's time."""
-        valid = frame.joint_valid & np.isfinite(frame.joint_position)
-        complete = bool(valid.all())
-        measured = frame.joint_position if complete else np.where(valid, frame.joint_position, 0.0)
-        joints = advance_joints(state, measured, valid, dt, self._config.joint)
-        newest = measured.copy() if complete else np.where(valid, measured, joints.position)
         delay = frame.time - frame.joint_time
-        if delay.any():
-            newest += np.where((delay > 0.0) & (delay <= MAX_READ_DELAY), delay, 0.0) * joints.velocity
-        return joints, newest
+        return self._joints.advance(state, frame.joint_position, frame.joint_valid, delay, dt)
 
-    def _predict(
-        self, memory: _Memory, angles: FloatArray, samples: list[Sample], span: tuple[float, float]
-    ) -> _Prediction:
-        """Carry the filter to the frame's time."""
-        before = memory.filter
-        motion = integrate(
-            before.quaternion, before.velocity, samples, span=span,
-            biases=(before.gyro_bias, before.accel_bias),
+    def _report(self, memory: _Memory, ahead: Prediction, before: FloatArray) -> FloatArray:
+        return self._odometry.advance(
+            memory.position, before, memory.filter.estimate, ahead,
+            used=memory.stance.used, contact=memory.switches.contact, rate=memory.rate,
         )  # fmt: skip
-        bend = (angles - memory.angles).reshape(N_LEGS, -1)[:, 1:].sum(axis=1).tolist()
-        direction = [a + q for a, q in zip(self._azimuth, angles[::4].tolist(), strict=True)]
-        rotation = rotation_matrix(motion.quaternion)
-        roll = rolling(self._geometry.foot_radius, rotation, np.array(motion.turn), direction, bend)
-        noise = frame_noise(samples, self._config.imu)
-        state = predict(
-            before, motion, roll, noise, rotation=rotation, dt=span[1] - span[0], config=self._config
-        )
-        return _Prediction(state, motion, roll, rotation)
 
-    def _correct(
-        self, memory: _Memory, ahead: _Prediction, samples: list[Sample], *, standing: list[bool],
-        angles: FloatArray, points: FloatArray, dt: float,
-    ) -> tuple[FilterState, StanceState, RestState]:  # fmt: skip
-        """Use standing feet, and the gyro's rest."""
-        config = self._config
-        jacobians = foot_jacobians_in_base(self._geometry, angles)
-        feet = measure_feet(ahead.rotation, points - self._mount, jacobians, config.contact)
-        state, stance = advance_stance(
-            ahead.filter, memory.stance, feet, standing, dt=dt, config=config.contact
-        )
-        rest = advance_rest(memory.rest, angles, dt, config.rest)
-        if at_rest(rest, standing, samples, state, config.rest):
-            state = correct_bias(state, samples, config.rest)
-        return state, stance, rest
-
-    def _finish(self, memory: _Memory, points: FloatArray) -> BodyState:
+    def _finish(
+        self, memory: _Memory, ahead: Prediction, known: list[float], before: FloatArray
+    ) -> BodyState:
         """Keep the memory and make the public record from it."""
-        self._memory = memory
-        state = memory.filter
-        rotation = rotation_matrix(state.quaternion)
-        wx, wy, wz = memory.rate
-        mx, my, mz = self._config.imu.mount
-        spin = (wy * mz - wz * my, wz * mx - wx * mz, wx * my - wy * mx)
-        contact = memory.switches.contact
-        known = known_legs(memory.joints, self._config.joint)
+        report = self._report(memory, ahead, before)
+        self._memory = memory._replace(position=report[0:3])
         return BodyState(
             time=memory.time,
-            position=np.array(memory.odometry.position) - rotation @ self._mount,
-            quaternion=np.array(state.quaternion),
-            rpy=np.array(_rpy(state.quaternion)),
-            linear_velocity=np.array(state.velocity) @ rotation - spin,
-            angular_velocity=np.array(memory.rate),
-            joint_position=memory.angles,
+            position=report[3:6],
+            quaternion=report[6:10],
+            rpy=report[10:13],
+            linear_velocity=report[13:16],
+            angular_velocity=report[16:19],
+            joint_position=memory.joints.newest,
             joint_velocity=memory.joints.velocity,
-            contact=contact,
-            foot_position_in_base=points,
-            height=trunk_height(points @ rotation.T, contact.tolist()),
-            healthy=memory.imu_age <= self._config.imu.lost_after and int(known.sum()) >= MIN_KNOWN_LEGS,
+            contact=np.array(memory.switches.contact),
+            foot_position_in_base=report[20:32].reshape(N_LEGS, 3),
+            height=float(report[19]),
+            healthy=memory.imu_age <= self._config.imu.lost_after and sum(known) >= MIN_KNOWN_LEGS,
         )
 
 
 def _doubtful(before: FilterState, fresh: FilterState) -> FilterState:
     """What may be kept across a gap of unknown length: attitude and biases, the first with doubt."""
-    covariance = fresh.covariance.copy()
+    estimate, covariance = fresh.estimate.copy(), fresh.covariance.copy()
+    estimate[0:4] = before.estimate[0:4]
+    estimate[19:] = before.estimate[19:]
     covariance[18:, 18:] = before.covariance[18:, 18:]
     covariance[2, 2] += before.covariance[2, 2] + fresh.covariance[0, 0]
-    return fresh._replace(
-        quaternion=before.quaternion, gyro_bias=before.gyro_bias, accel_bias=before.accel_bias,
-        hard_iron=before.hard_iron, covariance=covariance,
-    )  # fmt: skip
-
-
-def _rpy(quaternion: tuple[float, float, float, float]) -> tuple[float, float, float]:
-    """Roll, pitch, yaw (rad) of the zyx sequence."""
-    x, y, z, w = quaternion
-    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch = math.asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x))))
-    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return roll, pitch, yaw
+    return FilterState(estimate, covariance)

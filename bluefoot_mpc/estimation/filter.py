@@ -14,18 +14,13 @@ whatever the attitude, and a foot set down anew is uncorrelated with the rest.
 
 from __future__ import annotations
 
-import functools
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from bluefoot_mpc.estimation.config import EstimatorConfig, ImuConfig
-from bluefoot_mpc.estimation.inertial import (
-    Motion,
-    Quaternion,
-    Sample,
-    Vector,
-)
+from bluefoot_mpc.estimation.inertial import Quaternion, Vector
 from bluefoot_mpc.model.parameters import GRAVITY
 from bluefoot_mpc.types import N_LEGS, FloatArray
 
@@ -38,76 +33,57 @@ GYRO_BIAS = np.arange(18, 21)
 ACCEL_BIAS = np.arange(21, 24)
 HARD_IRON = np.arange(24, 26)
 SIZE = 26
-
-_NO_ERROR = np.eye(SIZE)
-# Linear map from a vector to the nine entries of its skew matrix.
-_SKEW = np.zeros((3, 9))
-_SKEW[0, 5], _SKEW[0, 7] = -1.0, 1.0
-_SKEW[1, 2], _SKEW[1, 6] = 1.0, -1.0
-_SKEW[2, 1], _SKEW[2, 3] = -1.0, 1.0
-# Gravity's moment of an attitude error, (0, 0, -g) x xi, on velocity.
-_TOPPLE = np.array(((0.0, GRAVITY, 0.0), (-GRAVITY, 0.0, 0.0), (0.0, 0.0, 0.0)))
+"""Components of the error."""
+VALUES = 27
+"""Values of the estimate: one more, for the quaternion."""
 
 
 class FilterState(NamedTuple):
     """Estimate and covariance.
 
     Attributes:
-        quaternion: rotation_base_to_world, x, y, z, w.
-        velocity: m/s of the IMU, world.
-        feet: (4, 3) m, foot points relative to the IMU, world axes.
-        gyro_bias: rad/s, base frame.
-        accel_bias: m/s², base frame.
-        hard_iron: of the field, constant part of the magnetometer in the base's x and y.
+        estimate: (27,) see the properties.
         covariance: (26, 26) of the errors: attitude, velocity, four feet, gyro
             bias, accelerometer bias, hard iron.
     """
 
-    quaternion: Quaternion
-    velocity: Vector
-    feet: FloatArray
-    gyro_bias: Vector
-    accel_bias: Vector
-    hard_iron: tuple[float, float]
+    estimate: FloatArray
     covariance: FloatArray
 
+    @property
+    def quaternion(self) -> Quaternion:
+        """rotation_base_to_world, x, y, z, w."""
+        x, y, z, w = self.estimate[0:4].tolist()
+        return (x, y, z, w)
 
-class Noise(NamedTuple):
-    """Variances that one frame adds.
+    @property
+    def velocity(self) -> Vector:
+        """m/s of the IMU, world."""
+        x, y, z = self.estimate[4:7].tolist()
+        return (x, y, z)
 
-    Attributes:
-        rate: rad²/s², of the frame's mean angular velocity.
-        force: m²/s⁴, of its mean specific force along the trunk's x or y, and z.
-    """
+    @property
+    def feet(self) -> FloatArray:
+        """(4, 3) m, foot points relative to the IMU, world axes."""
+        return self.estimate[7:19].reshape(N_LEGS, 3)
 
-    rate: float
-    force: tuple[float, float]
+    @property
+    def gyro_bias(self) -> Vector:
+        """rad/s, base frame."""
+        x, y, z = self.estimate[19:22].tolist()
+        return (x, y, z)
 
+    @property
+    def accel_bias(self) -> Vector:
+        """m/s², base frame."""
+        x, y, z = self.estimate[22:25].tolist()
+        return (x, y, z)
 
-def frame_noise(samples: list[Sample], config: ImuConfig) -> Noise:
-    """Variance of the means of a frame's samples, or of not knowing without any.
-
-    The spread of the specific force within the frame counts as its noise:
-    footfalls shake the trunk faster than the samples can follow, and what falls
-    between them is missing from the mean.
-
-    Args:
-        samples: of the frame.
-        config: noise figures.
-    """
-    n = len(samples)
-    if n == 0:
-        return Noise(config.lost_rate**2, (config.lost_accel**2, config.lost_accel**2))
-    least = config.accel_noise**2
-    x, y, z = (_spread([s.force[axis] for s in samples]) for axis in range(3))
-    shake = config.shake / n
-    return Noise(config.gyro_noise**2 / n, (least / n + shake * 0.5 * (x + y), least / n + shake * z))
-
-
-def _spread(values: list[float]) -> float:
-    """Mean square deviation from the mean."""
-    mean = sum(values) / len(values)
-    return sum([(value - mean) ** 2 for value in values]) / len(values)
+    @property
+    def hard_iron(self) -> tuple[float, float]:
+        """Of the field, constant part of the magnetometer in the base's x and y."""
+        x, y = self.estimate[25:27].tolist()
+        return (x, y)
 
 
 def initial_state(quaternion: Quaternion, tilt: float, config: EstimatorConfig) -> FilterState:
@@ -125,83 +101,61 @@ def initial_state(quaternion: Quaternion, tilt: float, config: EstimatorConfig) 
     deviation[GYRO_BIAS] = config.imu.gyro_bias
     deviation[ACCEL_BIAS] = config.imu.accel_bias
     deviation[HARD_IRON] = config.heading.hard_iron
-    zero = (0.0, 0.0, 0.0)
-    return FilterState(quaternion, zero, np.zeros((N_LEGS, 3)), zero, zero, (0.0, 0.0), np.diag(deviation**2))
+    estimate = np.zeros(VALUES)
+    estimate[0:4] = quaternion
+    return FilterState(estimate, np.diag(deviation**2))
 
 
-def transition(
-    rotation: FloatArray, velocity: FloatArray, feet: FloatArray, dt: float
-) -> tuple[FloatArray, FloatArray]:
-    """Linear propagation of the error over one frame.
+def frame_noise(sums: Any, config: ImuConfig) -> tuple[Any, Any]:
+    """Variances of the means of a frame's samples, or of not knowing without any.
+
+    The spread of the specific force within the frame counts as its noise:
+    footfalls shake the trunk faster than the samples can follow, and what falls
+    between them is missing from the mean.
 
     Args:
-        rotation: (3, 3) rotation_base_to_world; anywhere in the frame will do.
-        velocity: (3,) m/s, world, mean over the frame.
-        feet: (4, 3) m, relative to the IMU, world axes.
+        sums: 10 values, last part of what `inertial.Strapdown` carries.
+        config: noise figures.
+
+    Returns:
+        rad²/s² of the mean angular velocity, and (m/s²)² of the mean force on each axis.
+    """
+    any_sample = sums[0] > 0.0
+    n = ca.if_else(any_sample, sums[0], 1.0)
+    mean = sums[4:7] / n
+    spread = ca.fmax(0.0, sums[7:10] / n - mean * mean)
+    # How the shaking lies about the vertical is not known.
+    level = 0.5 * (spread[0] + spread[1])
+    force = config.accel_noise**2 / n + config.shake / n * ca.vertcat(level, level, spread[2])
+    rate = ca.if_else(any_sample, config.gyro_noise**2 / n, config.lost_rate**2)
+    return rate, ca.if_else(any_sample, force, config.lost_accel**2)
+
+
+def transition(rotation: Any, velocity: Any, feet: Any, dt: Any) -> tuple[Any, Any]:
+    """Linear propagation of the error over one frame, as CasADi expressions.
+
+    Args:
+        rotation: 3 x 3 rotation_base_to_world; anywhere in the frame will do.
+        velocity: 3 m/s, world, mean over the frame.
+        feet: 12 m, relative to the IMU, world axes.
         dt: s.
 
     Returns:
-        (26, 26) transition of the error, and (18, 3) lever of an angular rate
+        26 x 26 transition of the error, and 18 x 3 lever of an angular rate
         error in world axes on attitude, velocity and feet.
     """
-    levers = np.empty((6, 3, 3))
-    levers[0] = _NO_ERROR[:3, :3]
-    levers[1:] = (np.concatenate((velocity[None], feet)) @ _SKEW).reshape(5, 3, 3)
-    lever = levers.reshape(18, 3)
-    step = _NO_ERROR.copy()
-    topple = dt * _TOPPLE
+    points = [velocity, *(feet[3 * leg : 3 * leg + 3] for leg in range(N_LEGS))]
+    lever = ca.vertcat(ca.SX.eye(3), *(ca.skew(point) for point in points))
+    # Gravity's moment of an attitude error, (0, 0, -g) x xi, on velocity.
+    topple = dt * ca.skew(ca.DM([0.0, 0.0, -GRAVITY]))
     half = -0.5 * dt * topple
+    step = ca.SX.eye(SIZE)
     step[3:6, 0:3] = topple
-    step[:18, 18:21] = (-dt) * lever @ rotation
+    step[:18, 18:21] = -dt * (lever @ rotation)
     step[3:6, 18:21] += half @ rotation
-    step[3:6, 21:24] = (-dt) * rotation
-    fall = (0.5 * dt * dt) * rotation
-    feet_rows = step[6:18].reshape(N_LEGS, 3, SIZE)
-    feet_rows[:, :, 0:3] = half
-    feet_rows[:, :, 21:24] = fall
-    step[_FEET_DIAGONAL, _VELOCITY_DIAGONAL] = -dt
+    step[3:6, 21:24] = -dt * rotation
+    for row in range(6, 18, 3):
+        step[row : row + 3, 0:3] = half
+        step[row : row + 3, 3:6] = -dt * ca.SX.eye(3)
+        step[row : row + 3, 21:24] = (0.5 * dt * dt) * rotation
     return step, lever
-
-
-_FEET_DIAGONAL = FEET
-_VELOCITY_DIAGONAL = np.tile(VELOCITY, N_LEGS)
-
-
-def predict(
-    state: FilterState, motion: Motion, roll: FloatArray, noise: Noise, *, rotation: FloatArray,
-    dt: float, config: EstimatorConfig,
-) -> FilterState:  # fmt: skip
-    """Carry estimate and covariance over one frame.
-
-    Args:
-        state: at the start.
-        motion: mean motion of the IMU, from `inertial.integrate`.
-        roll: (4, 3) m, way of the foot points over the ground by rolling, world axes.
-        noise: of the frame's inertial samples.
-        rotation: (3, 3) rotation_base_to_world at the end.
-        dt: s.
-        config: drifts and slip.
-    """
-    velocity = 0.5 * (np.array(state.velocity) + motion.velocity)
-    feet = state.feet + roll - np.array(motion.displacement)
-    step, lever = transition(rotation, velocity, state.feet, dt)
-    covariance = step @ state.covariance @ step.T
-    covariance[:18, :18] += (noise.rate * dt * dt) * (lever @ lever.T)
-    diagonal = covariance.reshape(-1)[:: SIZE + 1]
-    diagonal += dt * _drift(config)
-    horizontal, vertical = noise.force
-    diagonal[3:5] += horizontal * dt * dt
-    diagonal[5] += vertical * dt * dt
-    return state._replace(
-        quaternion=motion.quaternion, velocity=motion.velocity, feet=feet, covariance=covariance
-    )
-
-
-@functools.lru_cache(maxsize=8)
-def _drift(config: EstimatorConfig) -> FloatArray:
-    """(26,) variances per second that slip and drifts add; do not write to it."""
-    diagonal = np.zeros(SIZE)
-    diagonal[FEET] = config.contact.slip**2
-    diagonal[GYRO_BIAS] = config.imu.gyro_drift**2
-    diagonal[ACCEL_BIAS] = config.imu.accel_drift**2
-    return diagonal

@@ -1,16 +1,20 @@
 """Inertial samples: screening, and integration of attitude and velocity.
 
-Everything here works on plain floats: at four samples a frame they are several
-times faster than arrays of three.
+Screening works on plain floats: at four samples a frame they are several times
+faster than arrays of three.
 """
 
 from __future__ import annotations
 
+import functools
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import casadi as ca
 import numpy as np
 
+from bluefoot_mpc.estimation import symbols
+from bluefoot_mpc.estimation.workspace import Workspace, compile_function
 from bluefoot_mpc.model.parameters import GRAVITY
 from bluefoot_mpc.types import FloatArray, ImuBatch
 
@@ -18,6 +22,13 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 ZERO: Vector = (0.0, 0.0, 0.0)
+Span = tuple[float, float]
+
+UPRIGHT = ca.DM([0.0, 0.0, GRAVITY])
+"""m/s², specific force at rest."""
+MOTION_SIZE = 23
+_CHUNK = 5  # samples, one more than a frame has at 200 Hz
+_CHUNK_VALUES = 8 * _CHUNK
 
 
 class Sample(NamedTuple):
@@ -35,19 +46,38 @@ class Sample(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Attitude and velocity carried over one frame.
+    """Attitude and velocity carried over one frame, and sums of its samples.
 
     Attributes:
-        quaternion: rotation_base_to_world at the end.
-        velocity: m/s of the IMU in the world at the end.
-        displacement: m, way of the IMU in the world.
-        turn: rad, integrated angular velocity in the base frame.
+        values: (23,) what `Strapdown` carries; see its properties.
     """
 
-    quaternion: Quaternion
-    velocity: Vector
-    displacement: Vector
-    turn: Vector
+    values: FloatArray
+
+    @property
+    def quaternion(self) -> FloatArray:
+        """(4,) rotation_base_to_world at the end."""
+        return self.values[0:4]
+
+    @property
+    def velocity(self) -> FloatArray:
+        """(3,) m/s of the IMU in the world at the end."""
+        return self.values[4:7]
+
+    @property
+    def displacement(self) -> FloatArray:
+        """(3,) m, way of the IMU in the world."""
+        return self.values[7:10]
+
+    @property
+    def turn(self) -> FloatArray:
+        """(3,) rad, integrated angular velocity in the base frame."""
+        return self.values[10:13]
+
+    @property
+    def sums(self) -> FloatArray:
+        """(10,) number of samples, sums of their rates, of their forces but for rest, and of its squares."""
+        return self.values[13:23]
 
 
 def usable_samples(batch: ImuBatch, after: float, until: float, last: Sample | None) -> list[Sample]:
@@ -76,16 +106,54 @@ def usable_samples(batch: ImuBatch, after: float, until: float, last: Sample | N
     return samples
 
 
-def integrate(
-    quaternion: Quaternion, velocity: Vector, samples: list[Sample], *,
-    span: tuple[float, float], biases: tuple[Vector, Vector],
-) -> Motion:  # fmt: skip
-    """Carry attitude and velocity of the IMU over one frame.
+class Strapdown:
+    """Workspace that carries attitude and velocity of the IMU; holds no memory of the motion.
 
     A sample stands for the mean over the time since its predecessor, as sensors
     that low-pass and decimate give it; forces are seen from the middle of that
     turn. The last sample also fills the rest of the frame; without samples the
     robot goes on without turning or accelerating.
+    """
+
+    def __init__(self) -> None:
+        self._work = Workspace(_strapdown())
+
+    def advance(self, start: FloatArray, biases: FloatArray, samples: list[Sample], span: Span) -> Motion:
+        """Integrate one frame.
+
+        Args:
+            start: (7,) quaternion and velocity (m/s, world) at the start.
+            biases: (6,) of gyro (rad/s) and accelerometer (m/s²), base frame.
+            samples: what `usable_samples` gave.
+            span: s, start and end of the frame.
+        """
+        carried, known, rows = self._work.inputs
+        carried[:7] = start
+        carried[7:] = 0.0
+        known[:] = biases
+        time, end = span
+        if not samples:
+            carried[7:10] = carried[4:7] * (end - time)
+        values: list[float] = []
+        last = len(samples) - 1
+        for k, (when, rate, force) in enumerate(samples):
+            until = end if k == last else when
+            values += (1.0, until - time, *rate, *force)
+            time = until
+        for first in range(0, len(values), _CHUNK_VALUES):
+            chunk = values[first : first + _CHUNK_VALUES]
+            chunk += [0.0] * (_CHUNK_VALUES - len(chunk))
+            rows[:] = chunk
+            self._work.call()
+            carried[:] = self._work.outputs[0]
+        return Motion(carried.copy())
+
+
+def integrate(
+    quaternion: Quaternion, velocity: Vector, samples: list[Sample], *,
+    span: Span, biases: tuple[Vector, Vector],
+) -> Motion:  # fmt: skip
+    """Carry attitude and velocity of the IMU over one frame; see `Strapdown`.
 
     Args:
         quaternion: rotation_base_to_world at the start.
@@ -94,52 +162,36 @@ def integrate(
         span: s, start and end of the frame.
         biases: gyro bias (rad/s) and accelerometer bias (m/s²), base frame.
     """
-    (bx, by, bz), (cx, cy, cz) = biases
-    vx, vy, vz = velocity
-    px = py = pz = tx = ty = tz = 0.0
-    time, end = span
-    for k, sample in enumerate(samples):
-        until = end if k + 1 == len(samples) else sample.time
-        dt = until - time
-        time = until
-        (wx, wy, wz), (ax, ay, az) = sample.rate, sample.force
-        dx, dy, dz = (wx - bx) * dt, (wy - by) * dt, (wz - bz) * dt
-        middle = turned(quaternion, 0.5 * dx, 0.5 * dy, 0.5 * dz)
-        fx, fy, fz = rotated(middle, ax - cx, ay - cy, az - cz)
-        fz -= GRAVITY
-        px += (vx + 0.5 * fx * dt) * dt
-        py += (vy + 0.5 * fy * dt) * dt
-        pz += (vz + 0.5 * fz * dt) * dt
-        vx, vy, vz = vx + fx * dt, vy + fy * dt, vz + fz * dt
-        tx, ty, tz = tx + dx, ty + dy, tz + dz
-        quaternion = turned(quaternion, dx, dy, dz)
-    rest = end - time if not samples else 0.0
-    way = (px + vx * rest, py + vy * rest, pz + vz * rest)
-    return Motion(quaternion, (vx, vy, vz), way, (tx, ty, tz))
+    start, known = np.array((*quaternion, *velocity)), np.array((*biases[0], *biases[1]))
+    return Strapdown().advance(start, known, samples, span)
 
 
-def turned(quaternion: Quaternion, dx: float, dy: float, dz: float) -> Quaternion:
-    """`quaternion` followed by the rotation by the vector (dx, dy, dz) rad in the base frame."""
-    return quaternion_product(quaternion, small_quaternion(dx, dy, dz))
+@functools.lru_cache(maxsize=1)
+def _strapdown() -> Any:
+    """Integration over `_CHUNK` samples (immutable, so it may be shared); a row of zeros changes nothing.
 
-
-def small_quaternion(dx: float, dy: float, dz: float) -> Quaternion:
-    """The rotation by the vector (dx, dy, dz) rad."""
-    angle = math.sqrt(dx * dx + dy * dy + dz * dz)
-    half = 0.5 - angle * angle / 48.0 if angle < 1e-3 else math.sin(0.5 * angle) / angle
-    return (half * dx, half * dy, half * dz, math.cos(0.5 * angle))
-
-
-def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """The rotation by `b`, then by `a`, normalised."""
-    x, y, z, w = a
-    ex, ey, ez, ew = b
-    qx = w * ex + x * ew + y * ez - z * ey
-    qy = w * ey - x * ez + y * ew + z * ex
-    qz = w * ez + x * ey - y * ex + z * ew
-    qw = w * ew - x * ex - y * ey - z * ez
-    scale = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
-    return (qx * scale, qy * scale, qz * scale, qw * scale)
+    Rows are weight, duration (s), angular velocity and specific force. Carried
+    are quaternion, velocity, way, turn, and for the noise of the frame the sums
+    of weights, rates, forces without `UPRIGHT`, and squares of those.
+    """
+    carried, biases = ca.SX.sym("carried", MOTION_SIZE), ca.SX.sym("biases", 6)
+    rows = ca.SX.sym("rows", _CHUNK_VALUES)
+    quaternion, velocity, way, turn, sums = ca.vertsplit(carried, [0, 4, 7, 10, 13, 23])
+    for k in range(_CHUNK):
+        weight, dt, rate, measured = ca.vertsplit(rows[8 * k : 8 * k + 8], [0, 1, 2, 5, 8])
+        step = (rate - biases[:3]) * dt
+        middle = symbols.quaternion_product(quaternion, symbols.small_quaternion(0.5 * step))
+        force = symbols.rotated(middle, measured - biases[3:]) - UPRIGHT
+        way += (velocity + 0.5 * force * dt) * dt
+        velocity += force * dt
+        turn += step
+        quaternion = symbols.quaternion_product(quaternion, symbols.small_quaternion(step))
+        shake = measured - UPRIGHT
+        sums += weight * ca.vertcat(1.0, rate, shake, shake * shake)
+    return compile_function(
+        "strapdown", {"carried": carried, "biases": biases, "rows": rows},
+        {"after": ca.vertcat(quaternion, velocity, way, turn, sums)},
+    )  # fmt: skip
 
 
 def rotated(quaternion: Quaternion, ax: float, ay: float, az: float) -> Vector:

@@ -28,11 +28,19 @@ class RestState(NamedTuple):
     time: float
 
 
-def advance_rest(state: RestState, joints: FloatArray, dt: float, config: RestConfig) -> RestState:
-    """Count the time for which no joint has moved further than a step of its servo."""
-    if float(np.abs(joints - state.joints).max()) <= config.joint_move:
-        return RestState(state.joints, state.time + dt)
-    return RestState(joints, 0.0)
+def advance_rest(
+    state: RestState, moved: float, joints: FloatArray, dt: float, config: RestConfig
+) -> RestState:
+    """Count the time for which no joint has moved further than a step of its servo.
+
+    Args:
+        state: memory.
+        moved: rad, largest distance of a joint from where it came to rest.
+        joints: (16,) rad.
+        dt: s.
+        config: how far is a move.
+    """
+    return RestState(state.joints, state.time + dt) if moved <= config.joint_move else RestState(joints, 0.0)
 
 
 def at_rest(

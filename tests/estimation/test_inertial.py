@@ -1,5 +1,6 @@
 import math
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -7,12 +8,11 @@ from bluefoot_mpc.estimation.inertial import (
     Sample,
     integrate,
     level_quaternion,
-    quaternion_product,
     rotated,
     rotation_matrix,
-    small_quaternion,
     usable_samples,
 )
+from bluefoot_mpc.estimation.symbols import quaternion_product, small_quaternion
 from bluefoot_mpc.geometry import quaternion_from_rpy, rotation_from_quaternion, rotation_from_rpy
 from bluefoot_mpc.model.parameters import GRAVITY
 from bluefoot_mpc.types import ImuBatch
@@ -36,7 +36,7 @@ def test_quaternions_agree_with_the_shared_geometry():
     rng = np.random.default_rng(1)
     first, second = (quaternion_from_rpy(rng.uniform(-1, 1, 3)) for _ in range(2))
     a, b = tuple(first.tolist()), tuple(second.tolist())
-    product = rotation_matrix(quaternion_product(a, b))
+    product = rotation_matrix(tuple(quaternion_product(ca.DM(a), ca.DM(b)).full().ravel()))
     np.testing.assert_allclose(
         product, rotation_from_quaternion(first) @ rotation_from_quaternion(second), atol=1e-14
     )
@@ -46,7 +46,7 @@ def test_quaternions_agree_with_the_shared_geometry():
 
 def test_small_rotation_is_smooth_across_its_series():
     for angle in (0.0, 1e-9, 0.999e-3, 1.001e-3, 0.5, 3.0):
-        x, y, z, w = small_quaternion(0.0, angle, 0.0)
+        x, y, z, w = small_quaternion(ca.DM([0.0, angle, 0.0])).full().ravel()
         assert (x, z) == (0.0, 0.0)
         assert y == pytest.approx(math.sin(angle / 2), abs=1e-15)
         assert w == pytest.approx(math.cos(angle / 2), abs=1e-15)
@@ -87,7 +87,7 @@ def test_without_samples_the_robot_goes_on_straight():
         LEVEL, (0.1, 0.2, 0.0), [], span=(1.0, 1.02),
         biases=((1.0, 1.0, 1.0), (1.0, 1.0, 1.0)),
     )  # fmt: skip
-    assert motion.quaternion == LEVEL
+    np.testing.assert_array_equal(motion.quaternion, LEVEL)
     np.testing.assert_allclose(motion.displacement, [0.002, 0.004, 0.0], atol=1e-15)
 
 
@@ -115,3 +115,22 @@ def test_attitude_from_gravity():
     quaternion = level_quaternion([Sample(0.0, (0.0, 0.0, 0.0), tuple(force))])
     np.testing.assert_allclose(rotation_matrix(quaternion), rotation_from_rpy(rpy), atol=1e-14)
     assert level_quaternion([]) == LEVEL
+
+
+def test_any_number_of_samples_can_be_integrated():
+    # Twelve samples take several rounds, with rows to spare in the last one.
+    rng = np.random.default_rng(3)
+    samples = [
+        Sample(0.002 * (k + 1), tuple(rng.normal(size=3)), tuple(rng.normal(size=3))) for k in range(12)
+    ]
+    biases = ((0.01, 0.02, 0.03), (0.1, 0.2, 0.3))
+    whole = integrate(LEVEL, (0.1, 0.2, 0.3), samples, span=(0.0, 0.03), biases=biases)
+    first = integrate(LEVEL, (0.1, 0.2, 0.3), samples[:7], span=(0.0, 0.014), biases=biases)
+    start = tuple(first.quaternion), tuple(first.velocity)
+    rest = integrate(*start, samples[7:], span=(0.014, 0.03), biases=biases)
+    np.testing.assert_allclose(whole.quaternion, rest.quaternion, atol=1e-15)
+    np.testing.assert_allclose(whole.velocity, rest.velocity, atol=1e-15)
+    np.testing.assert_allclose(whole.displacement, first.displacement + rest.displacement, atol=1e-15)
+    np.testing.assert_allclose(whole.sums, first.sums + rest.sums, atol=1e-12)
+    rates = np.array([sample.rate for sample in samples])
+    np.testing.assert_allclose(whole.sums[:4], [12.0, *rates.sum(axis=0)], atol=1e-14)

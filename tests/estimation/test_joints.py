@@ -1,8 +1,17 @@
+import math
+
 import numpy as np
 import pytest
 
 from bluefoot_mpc.estimation.config import JointFilterConfig
-from bluefoot_mpc.estimation.joints import advance_joints, initial_joints, known_legs, speed_lag
+from bluefoot_mpc.estimation.joints import (
+    MAX_READ_DELAY,
+    JointFilter,
+    advance_joints,
+    initial_joints,
+    known_legs,
+    speed_lag,
+)
 from bluefoot_mpc.exceptions import ConfigurationError
 
 CONFIG = JointFilterConfig()
@@ -56,6 +65,29 @@ def test_a_silent_joint_goes_on_and_slows_down():
     for _ in range(10):
         state = advance_joints(state, np.full(16, 0.8), silent, DT, CONFIG)
     np.testing.assert_array_equal(known_legs(state, CONFIG), [True, False, True, True])
+
+
+def test_angles_are_carried_over_a_short_delay_only():
+    tracker, state = JointFilter(CONFIG), initial_joints()
+    delay = np.zeros(16)
+    delay[1:4] = 0.01, 2.0 * MAX_READ_DELAY, -0.01
+    for k in range(40):
+        state, known = tracker.advance(state, np.full(16, 0.02 * k), ALL, delay, DT if k else 0.0)
+    speed = state.velocity[0]
+    expected = np.full(16, 0.78)
+    expected[1] += 0.01 * speed
+    np.testing.assert_allclose(state.newest, expected, atol=1e-15)
+    assert known == known_legs(state, CONFIG).tolist()
+
+
+def test_a_reading_that_is_no_number_is_none():
+    first = advance_joints(initial_joints(), np.full(16, 0.5), ALL, 0.0, CONFIG)
+    measured, valid = np.full(16, 0.6), ALL.copy()
+    measured[3], measured[7], valid[[3, 7]] = math.nan, math.inf, False
+    silent = advance_joints(first, np.full(16, 0.6), valid, DT, CONFIG)
+    broken = advance_joints(first, measured, ALL, DT, CONFIG)
+    np.testing.assert_array_equal(broken.values, silent.values)
+    assert broken.newest[3] == broken.position[3]
 
 
 def test_impossible_gains_are_refused():
