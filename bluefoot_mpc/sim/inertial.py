@@ -25,18 +25,22 @@ class InertialWindows:
 
     All windows of a frame are one call of a CasADi function, 2 µs; the window
     that a frame leaves open goes on in the next.
+
+    Attributes:
+        values: (count, 6) angular velocity (rad/s) and specific force (m/s²) in
+            the windows of the last frame, base frame; rewritten by every frame.
     """
 
     def __init__(self, mount: tuple[float, float, float], period: float, count: int) -> None:
         """Make room for `count` windows of `period` seconds for a sensor at `mount` (m, base frame)."""
         self._states = np.zeros((count + 1, _STATE))
         self._states[:, 3] = 1.0
-        self._means = np.zeros((count, 6))
+        self.values = np.zeros((count, 6))
         self._function = window_function(mount, period, count)
         buffer: Any
         buffer, self._run = self._function.buffer()
         buffer.set_arg(0, self._states.data)
-        buffer.set_res(0, self._means.data)
+        buffer.set_res(0, self.values.data)
         self._buffer = buffer
 
     def begin(self, pose: FloatArray, twist: FloatArray) -> None:
@@ -56,13 +60,13 @@ class InertialWindows:
         state[7:] = twist
 
     def means(self, count: int) -> FloatArray:
-        """(count, 6) mean angular velocity (rad/s) and specific force (m/s²), base frame.
+        """Close a frame of `count` windows; gives their rows of `values`.
 
         The last closed window's end is where the next frame begins.
         """
         self._run()
         self._states[0] = self._states[count]
-        return self._means[:count].copy()
+        return self.values[:count]
 
 
 def window_function(mount: tuple[float, float, float], period: float, count: int) -> ca.Function:

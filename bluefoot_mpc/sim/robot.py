@@ -13,12 +13,12 @@ from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.sim.config import SimConfig
 from bluefoot_mpc.sim.inertial import InertialWindows
 from bluefoot_mpc.sim.randomization import draw
-from bluefoot_mpc.sim.sensors import FootSwitches, Imu, ServoSensors, all_valid
+from bluefoot_mpc.sim.sensors import SAMPLE, Probe, Sensors
 from bluefoot_mpc.sim.servo import BankConfig, Plant, ServoBank
 from bluefoot_mpc.sim.terrain import Ground
 from bluefoot_mpc.sim.truth import TruthReader
 from bluefoot_mpc.sim.world import World, build_world
-from bluefoot_mpc.types import N_JOINTS, N_LEGS, FloatArray, JointCommand, SensorFrame, TruthSample
+from bluefoot_mpc.types import N_JOINTS, FloatArray, JointCommand, SensorFrame, TruthSample
 
 _SENSORS_OFF = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 _NEVER = 1 << 62
@@ -60,16 +60,24 @@ class SimRobot:
             ),
             _plant(self._world),
         )
-        self._imu = Imu(config.sensors, seed)
-        self._switches = FootSwitches(config.sensors, seed)
-        self._reports = ServoSensors(config.sensors, robot.parameters.servo, seed)
         self._ground = Ground(config.world, self._world.model, self._world.data)
-        self._truth = TruthReader(self._world, self._ground, robot.parameters.legs.foot_radius)
-        windows = self._steps // self._imu_steps + 1
+        self._truth = TruthReader(self._world, self._ground, self._bank, robot.parameters.legs.foot_radius)
+        windows = -(-self._steps // self._imu_steps)
         self._inertial = InertialWindows(robot.parameters.sensors.imu, config.sensors.imu_period, windows)
-        self._sensed = np.zeros((windows, 15))
+        self._samples = np.zeros((windows, SAMPLE))
+        probe = Probe(
+            means=self._inertial.values,
+            samples=self._samples,
+            position=self._bank.plant.position,
+            duty=self._bank.duty,
+            temperature=self._bank.temperature,
+            physics_period=config.physics_period,
+            frame_steps=self._steps,
+            window_steps=self._imu_steps,
+        )
+        self._sensors = Sensors(config.sensors, robot.parameters.servo, probe, seed)
         world, data = self._world, self._world.data
-        self._sensor = data.sensordata[world.sensor : world.sensor + 15]
+        self._sample = data.sensordata[world.sensor : world.sensor + SAMPLE]
         self._pose, self._twist = data.qpos[world.q : world.q + 7], data.qvel[world.v : world.v + 6]
         self._commands: deque[tuple[int, JointCommand]] = deque()
         self._pushes: list[tuple[int, int, FloatArray]] = []
@@ -102,8 +110,8 @@ class SimRobot:
         self._force = np.zeros(3)
         self.discarded_commands = 0
         self._place()
-        for part in (self._bank, self._imu, self._switches, self._reports):
-            part.reset()
+        self._bank.reset()
+        self._sensors.reset()
         self._bank.hold(self._robot.stance_joints)
         # Standing still is simulated before time zero, the last command period with sensors.
         settle = max(1, math.ceil(self.config.settle_time / self.config.command_period)) * self._steps
@@ -149,7 +157,7 @@ class SimRobot:
 
     def truth(self) -> TruthSample:
         """The true state at the last frame: for reports, never for a controller."""
-        return self._truth.read(self._step * self.config.physics_period, self._bank, self._force)
+        return self._truth.read(self._step * self.config.physics_period, self._force)
 
     def apply_push(self, force: FloatArray, duration: float) -> None:
         """Push the trunk's origin from now on.
@@ -180,34 +188,15 @@ class SimRobot:
     def _run_frame(self) -> SensorFrame:
         """Physics of one command period, then what the sensors say of it."""
         self._truth.start_frame()
-        times = self._advance()
-        dt, now = self.config.physics_period, self._step * self.config.physics_period
+        first, count = self._advance()
         if not math.isfinite(self._pose[2]):
+            now = self._step * self.config.physics_period
             raise DeviceError(f"the simulation became unstable before t = {now:.3f} s")
-        count = len(times)
-        sensed = self._sensed[:count]
-        bank = self._bank
-        self._truth.power, voltage = bank.finish_frame(self._steps)
-        position, speed, load = self._reports.measure(bank.plant.position, bank.duty, self._steps * dt)
-        force = np.sqrt(np.square(sensed[:, 3:].reshape(count, N_LEGS, 3)).sum(axis=2))
-        contact, contact_time = self._switches.measure(times, force, now)
-        return SensorFrame(
-            time=now,
-            joint_position=position,
-            joint_speed=speed,
-            joint_load=load,
-            joint_temperature=np.rint(bank.temperature),
-            joint_time=np.full(N_JOINTS, now),
-            joint_valid=all_valid(N_JOINTS),
-            voltage=round(voltage, 1),
-            voltage_valid=True,
-            imu=self._imu.measure(np.array(times), self._inertial.means(count), sensed[:, :3]),
-            contact=contact,
-            contact_time=np.full(N_LEGS, contact_time),
-            contact_valid=all_valid(N_LEGS),
-        )
+        self._truth.power, voltage = self._bank.finish_frame(self._steps)
+        self._inertial.means(count)
+        return self._sensors.measure(self._step, first, count, voltage)
 
-    def _advance(self) -> list[float]:
+    def _advance(self) -> tuple[int, int]:
         """The physics steps of one frame.
 
         Gyro and accelerometer give means over the IMU's period. The other
@@ -215,30 +204,31 @@ class SimRobot:
         one physics step old.
 
         Returns:
-            Times of the samples in the first rows of the sample buffer, s.
+            Number of the step that ends with the first sample, and of samples.
         """
         model, data = self._world.model, self._world.data
         option, advance, mj_step = model.opt, self._bank.advance, mujoco.mj_step
         flags = option.disableflags & ~_SENSORS_OFF
-        times: list[float] = []
-        option.disableflags = flags | _SENSORS_OFF
-        period = self._imu_steps
-        for step in range(self._step, self._step + self._steps):
-            if step >= self._next_event:
-                self._handle_events(step)
+        quiet = flags | _SENSORS_OFF
+        option.disableflags = quiet
+        period, count = self._imu_steps, 0
+        for step in range(self._step + 1, self._step + self._steps + 1):
+            if step > self._next_event:
+                self._handle_events(step - 1)
             advance()
-            if (step + 1) % period:
+            if step % period:
                 mj_step(model, data)
                 continue
             option.disableflags = flags
             mj_step(model, data)
-            option.disableflags = flags | _SENSORS_OFF
-            self._inertial.mark(len(times), self._pose, self._twist)
-            self._sensed[len(times)] = self._sensor
+            option.disableflags = quiet
+            self._inertial.mark(count, self._pose, self._twist)
+            self._samples[count] = self._sample
             self._truth.look_for_contacts()
-            times.append((step + 1) * self.config.physics_period)
+            count += 1
+        first = self._step // period * period + period
         self._step += self._steps
-        return times
+        return first, count
 
     def _handle_events(self, step: int) -> None:
         """Deliver the commands that have arrived and switch pushes on and off."""

@@ -90,8 +90,9 @@ class ServoBank:
         self._asked_limit: list[float] = []
         self._shut_down: BoolArray = np.zeros(N_JOINTS, dtype=np.bool_)
         self._sums = np.zeros(N_JOINTS + 2)
-        # Winding loss of a motor torque, W/(N·m)².
-        self._loss = law.winding_resistance(config.servo) * law.current_per_torque(config.servo) ** 2
+        # Mean power and voltage of a frame, highest temperature at its end.
+        self._summary = np.zeros(3)
+        self._frame_steps = 0
         self._function = servo_function(config)
         self._buffer, self.advance = self._connect()
         self.reset()
@@ -148,14 +149,14 @@ class ServoBank:
         Returns:
             Mean electrical power in W, mean voltage in V.
         """
-        mean = self._sums / steps
-        loss = self._loss * mean[:N_JOINTS]
-        self.temperature[:] = law.heat(self.config.servo, self.temperature, loss, steps * self.config.period)
-        if max(self.temperature.tolist()) >= law.SHUTDOWN_TEMPERATURE:
+        if steps != self._frame_steps:
+            self._frame_steps, self._frame_buffer = steps, self._connect_frame(steps)
+        self._close_frame()
+        self._sums.fill(0.0)
+        power, voltage, hottest = self._summary.tolist()
+        if hottest >= law.SHUTDOWN_TEMPERATURE:
             self._shut_down |= self.temperature >= law.SHUTDOWN_TEMPERATURE
             self._apply_limits()
-        self._sums.fill(0.0)
-        power, voltage = mean[N_JOINTS:].tolist()
         return power, voltage
 
     def _apply_limits(self) -> None:
@@ -182,6 +183,34 @@ class ServoBank:
         for index, array in enumerate((plant.drive, plant.friction, self.duty, self.torque, *states)):
             buffer.set_res(index, array.data)
         return buffer, run
+
+    def _connect_frame(self, steps: int) -> Any:
+        """Bind the function that closes a frame; temperatures are updated in place."""
+        buffer: Any
+        buffer, self._close_frame = frame_function(self.config, steps).buffer()
+        for index, array in enumerate((self._sums, self.temperature)):
+            buffer.set_arg(index, array.data)
+        for index, array in enumerate((self.temperature, self._summary)):
+            buffer.set_res(index, array.data)
+        return buffer
+
+
+def frame_function(config: BankConfig, steps: int) -> ca.Function:
+    """From the sums over `steps` physics steps and the temperatures: temperatures anew, and a summary.
+
+    The summary is mean electrical power (W), mean voltage (V), highest
+    temperature (°C).
+    """
+    servo = config.servo
+    # The law is written for arrays and holds for symbols.
+    temperature: Any = ca.SX.sym("temperature", N_JOINTS)
+    sums: Any = ca.SX.sym("sums", N_JOINTS + 2)
+    mean = sums / steps
+    # Winding loss of a motor torque, W/(N·m)².
+    loss = law.winding_resistance(servo) * law.current_per_torque(servo) ** 2 * mean[:N_JOINTS]
+    heated = law.heat(servo, temperature, loss, steps * config.period)
+    summary = ca.vertcat(mean[N_JOINTS:], ca.mmax(heated))
+    return ca.Function("frame", [sums, temperature], [heated, summary])
 
 
 def servo_function(config: BankConfig) -> ca.Function:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -52,11 +53,15 @@ def rough_heights(config: WorldConfig) -> FloatArray:
 
 
 class Ground:
-    """Height of the ground, by formula where it is a plane and by a ray elsewhere."""
+    """Height of the ground, by formula where it is a plane and by a ray elsewhere.
+
+    Attributes:
+        is_plane: True where nothing rises from the plane.
+    """
 
     def __init__(self, config: WorldConfig, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         self._model, self._data = model, data
-        self._plane = config.name in {"flat", "slope"}
+        self.is_plane = config.name in {"flat", "slope"}
         self._tilt = math.tan(config.slope)
         self._cosine = math.cos(config.slope)
         self._hit = np.zeros(1, dtype=np.int32)
@@ -70,7 +75,7 @@ class Ground:
             y: m in world.
             above: m, height to look down from: what hangs higher is no ground.
         """
-        if self._plane:
+        if self.is_plane:
             return x * self._tilt
         start = np.array([x, y, above])
         distance = mujoco.mj_ray(
@@ -85,10 +90,14 @@ class Ground:
             points: (n, 3) m, centres in world.
             radius: m.
         """
-        if self._plane:
-            return np.asarray((points[:, 2] - points[:, 0] * self._tilt) * self._cosine - radius)
+        if self.is_plane:
+            return np.asarray(self.plane_clearance(points[:, 0], points[:, 2], radius))
         ground = [self.height(p[0], p[1], p[2]) for p in points.tolist()]
         return np.asarray(points[:, 2] - ground - radius)
+
+    def plane_clearance(self, x: Any, z: Any, radius: float) -> Any:
+        """Distance of balls to the plane, m, from coordinates of their centres: arrays or symbols."""
+        return (z - x * self._tilt) * self._cosine - radius
 
 
 def _add_plane(spec: mujoco.MjSpec, frame: mujoco.MjsFrame, height: float) -> None:

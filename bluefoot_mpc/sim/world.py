@@ -41,8 +41,8 @@ class World:
         foot_geoms: (4,) geoms of the foot balls.
         body_of_part: for every geom, the name of its body where it is a part of
             the robot other than a foot, else "".
-        sensor: first entry of the robot's sensors: magnetometer (3), then the
-            force of the ground on each foot (4 x 3).
+        sensor: first entry of the robot's sensors: magnetometer (3), then of each
+            foot how many contacts it has and the force of the ground on it (4 x 4).
     """
 
     model: mujoco.MjModel
@@ -160,7 +160,8 @@ def _add_servos(spec: mujoco.MjSpec, parameters: RobotParameters) -> None:
 
 def _add_sensors(spec: mujoco.MjSpec, parameters: RobotParameters, config: SensorConfig) -> None:
     spec.body("trunk").add_site(name="imu", pos=list(parameters.sensors.imu))
-    kinds = mujoco.mjtSensor
+    kinds, fields = mujoco.mjtSensor, mujoco.mjtConDataField
+    data = 1 << int(fields.mjCONDATA_FOUND) | 1 << int(fields.mjCONDATA_FORCE)
     spec.add_sensor(
         name="magnetometer", type=kinds.mjSENS_MAGNETOMETER, objtype=mujoco.mjtObj.mjOBJ_SITE, objname="imu"
     )
@@ -170,7 +171,7 @@ def _add_sensors(spec: mujoco.MjSpec, parameters: RobotParameters, config: Senso
             type=kinds.mjSENS_CONTACT,
             objtype=mujoco.mjtObj.mjOBJ_GEOM,
             objname=f"{leg}_foot_ball",
-            intprm=[1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1],
+            intprm=[data, 3, 1],
         )
 
 
