@@ -169,10 +169,13 @@ class Pipeline:
         self, twist: tracking.Twist, motion: MotionCommand, estimate: BodyState, upright: FloatArray
     ) -> GaitInputs:
         error = (upright @ estimate.angular_velocity)[:2] - self._trunk.tilt_rate
+        # Heights count from the feet that stand: soft servos let the trunk droop below its reference.
+        trunk_x, trunk_y, _ = self._trunk.position.tolist()
+        trunk = np.array([trunk_x, trunk_y, estimate.height])
         return GaitInputs(
             velocity=twist.velocity, yaw_rate=twist.yaw_rate, gait=motion.gait, contact=estimate.contact,
-            foot_position=estimate.foot_position_in_base @ upright.T + self._trunk.position,
-            trunk_position=self._trunk.position,
+            foot_position=estimate.foot_position_in_base @ upright.T + trunk,
+            trunk_position=trunk,
             # No reflex on a rate that is no longer measured.
             tilt_rate_error=error if estimate.healthy else np.zeros(2),
             halt=self._modes.mode is Mode.SAFE,

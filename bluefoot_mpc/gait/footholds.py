@@ -29,8 +29,11 @@ class FootholdConfig:
     ground_damping: bool = False  # damp speed over ground (printed law; lags), not over the foothold
     ground_matching: float = 1.0  # minimum_jerk: 1 leaves and lands at rest on the ground, 0 in b'
     apex: float = 0.5  # quintic: progress of the highest point, 1
-    early_contact: bool = False  # freeze a foot that lands early
+    early_contact: bool = False  # freeze a foot that lands early; measured: it helps on no ground tried
     early_progress: float = 0.5  # progress from which a contact counts as a landing, 1
+    early_height: float = (
+        0.006  # height from which it counts; below, feet drooping onto level ground touch, m
+    )
     offset_limit: float = 0.03  # largest shift of a virtual foothold after a reset, m
     offset_time: float = 0.5  # time constant of its return, s
 
@@ -42,7 +45,7 @@ class FootholdConfig:
         require_range(-1.5, 1.5, ground_matching=self.ground_matching)
         require_range(0.1, 0.9, apex=self.apex)
         require_range(0.0, 1.0, early_progress=self.early_progress)
-        require_nonnegative(offset_limit=self.offset_limit)
+        require_nonnegative(offset_limit=self.offset_limit, early_height=self.early_height)
         require_positive(offset_time=self.offset_time)
 
 
@@ -170,14 +173,25 @@ def advance_foot(foot: Foot, clock: LegClock, stride: Stride, config: FootholdCo
         _land(foot)
 
 
-def early_contact(foot: Foot, contact: bool, progress: float, config: FootholdConfig) -> bool:
-    """Whether a swinging foot has landed early; arms itself once contact was lost (changes `foot`)."""
+def early_contact(
+    foot: Foot, contact: bool, progress: float, height: float | None, config: FootholdConfig
+) -> bool:
+    """Whether a swinging foot has landed early; arms itself once contact was lost (changes `foot`).
+
+    Args:
+        foot: the foot.
+        contact: True where its switch is closed.
+        progress: share of the swing's time passed.
+        height: m, estimated height over the ground plane, or None if unknown.
+        config: when a contact counts.
+    """
     if not foot.swinging:
         return False
     if not contact:
         foot.lost = True
         return False
-    return config.early_contact and foot.lost and progress >= config.early_progress
+    high = height is None or height >= config.early_height
+    return config.early_contact and foot.lost and high and progress >= config.early_progress
 
 
 def freeze(
@@ -192,6 +206,7 @@ def freeze(
         config: bound of the shift.
     """
     foot.anchor = stride.after.to_world(foot.local)
+    foot.velocity = 0j
     foot.swinging = False
     foot.goal = None
     if estimate is None:

@@ -167,8 +167,10 @@ class Gait:
         for leg, foot in enumerate(state.feet):
             if foot.swinging:
                 progress = state.rhythm.progress(state.cpg.y1[leg], state.cpg.y2[leg])[1]
-                if early_contact(foot, contact[leg], progress, self.config.foothold):
-                    freeze(foot, estimates[leg] if estimates else None, stride, self.config.foothold)
+                estimate = None if estimates is None else estimates[leg]
+                height = None if estimate is None else estimate[1]
+                if early_contact(foot, contact[leg], progress, height, self.config.foothold):
+                    freeze(foot, estimate, stride, self.config.foothold)
 
     def _fill_swings(
         self, state: GaitState, stance: BoolArray, places: FloatArray, last: Stride | None

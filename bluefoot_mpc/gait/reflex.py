@@ -17,9 +17,9 @@ from bluefoot_mpc.settings import require_nonnegative, require_positive
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ReflexConfig:
-    """Reflex on unwanted tilt rates; switched off it costs nothing."""
+    """Reflex on unwanted tilt rates; on level ground it is silent, switched off it costs nothing."""
 
-    enabled: bool = False
+    enabled: bool = True
     sharpness: float = 20.0  # w, slope of the activation, s/rad
     threshold: float = 1.0  # c, activation half way at this v_i, rad/s
     speed_gain: float = 0.5  # A_ω, how much faster the leg's oscillator turns, 1

@@ -51,16 +51,25 @@ def test_early_contact_moves_the_virtual_foothold_and_it_returns() -> None:
     walker = make(foothold=EARLY)
     to_progress(walker, 0.6)
     feet = STANCE.copy()
-    feet[0] += (0.02, -0.01, 0.004)
+    feet[0] += (0.02, -0.01, 0.008)
     walker.step(command(0.08, contact=DOWN, foot_position=feet), DT)
     foot = walker.state.feet[0]
     assert foot.offset.imag == pytest.approx(-0.01, abs=1e-3)
-    assert foot.offset_z == pytest.approx(0.004, abs=1e-3)
+    assert foot.offset_z == pytest.approx(0.008, abs=1e-3)
+    assert foot.velocity == 0.0
     before = abs(foot.offset)
     drive(walker, command(0.08), 0.5)
     assert abs(foot.offset) == pytest.approx(before * np.exp(-1.0), rel=0.03)
     drive(walker, command(0.08), 3.0)
     assert abs(foot.offset) < 1e-4
+
+
+def test_a_foot_that_touches_level_ground_lands_as_planned() -> None:
+    for height, lands in ((EARLY.early_height - 1e-3, False), (EARLY.early_height + 1e-3, True)):
+        walker = make(foothold=EARLY)
+        to_progress(walker, 0.6)
+        feet = STANCE + np.array([0.0, 0.0, height])
+        assert walker.step(command(0.08, contact=DOWN, foot_position=feet), DT).phase.swing[0] != lands
 
 
 def test_the_shift_is_bounded() -> None:

@@ -212,3 +212,18 @@ def test_step_is_quick() -> None:
     for _ in range(200):
         walker.step(inputs, DT)
     assert (time.perf_counter() - begin) / 200 < 1.5e-3
+
+
+def test_the_reflex_sees_feet_from_the_trunk_and_not_from_the_virtual_robot() -> None:
+    config = build(GaitConfig, merge(to_table(REFERENCE), {"reflex": {"enabled": True, "threshold": 0.5}}))
+    speeds = []
+    for trunk in (0.0, 0.4):  # ahead of every foot: then all legs lie behind a forward fall
+        walker = Gait(config, STANCE)
+        falling = command(
+            0.05, contact=np.zeros(4, dtype=bool), foot_position=STANCE,
+            tilt_rate_error=np.array([0.0, 0.4]), trunk_position=np.array([trunk, 0.0, 0.1]),
+        )  # fmt: skip
+        walker.step(falling, DT)
+        speeds.append(walker.state.reflex.psi_omega)
+    assert speeds[0][0] > 1.4
+    assert max(speeds[1]) < 1.01

@@ -30,7 +30,7 @@ def test_strength_is_fall_speed_plus_its_part_towards_the_foot() -> None:
 
 def test_standing_legs_and_the_switched_off_reflex_do_nothing() -> None:
     assert activation(5.0 + 0j, FEET[0], True, ON) == 0.0
-    assert reflex((0.0, 9.0), FEET, AIR, ReflexConfig()) is IDLE
+    assert reflex((0.0, 9.0), FEET, AIR, ReflexConfig(enabled=False)) is IDLE
 
 
 def test_shift_follows_the_fall_and_is_bounded() -> None:
