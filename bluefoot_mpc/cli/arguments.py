@@ -49,7 +49,7 @@ class SimulationArguments(Common):
     no_report: bool = False
     """Do not write report.html."""
     world: Annotated[str | None, _Unset] = None
-    """World by name or TOML file."""
+    """World by name (flat, rough, slope, steps), or an MJCF file."""
     friction: Annotated[float | None, _Unset] = None
     """Friction coefficient of the floor."""
     slope: Annotated[float | None, _Unset] = None
@@ -103,12 +103,15 @@ class RunCommand(SimulationArguments):
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayCommand(Common):
-    """Show a recorded run, or run today's controller on its sensor frames."""
+    """Show a recorded run, or run today's controller on its sensor frames.
+
+    A log that is cut off is shown as far as it goes; the exit status is then 2.
+    """
 
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="LOG", help_behavior_hint="")]
     """The log.mcap of a run, or the run's folder."""
     view: bool = False
-    """Play the run in a browser, at its own pace."""
+    """Play the run in a browser, at its own pace, until Ctrl-C."""
     html: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """Write the 3D replay as one HTML file that opens offline."""
     rethink: bool = False

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import sys
-import time as clock
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TextIO
 
@@ -16,7 +12,7 @@ from bluefoot_mpc.cli.outcome import Outcome
 from bluefoot_mpc.cli.run import outcome_of
 from bluefoot_mpc.cli.teleop import GAITS, HELP, Teleop, TeleopConfig, TeleopState
 from bluefoot_mpc.cli.terminal import Keyboard, raw_terminal
-from bluefoot_mpc.scenarios import RunOptions, Scenario, ScenarioConfig, run_commanded
+from bluefoot_mpc.scenarios import Presentation, RunOptions, Scenario, ScenarioConfig, run_commanded
 from bluefoot_mpc.scenarios.config import resolve
 from bluefoot_mpc.types import MotionCommand
 
@@ -42,6 +38,10 @@ class Drive(Scenario):
     def command(self, time: float) -> MotionCommand:
         """Stand; the commands come from the operator, not from here."""
         return MotionCommand(gait=self.config.gait)
+
+    def window(self) -> tuple[float, float]:
+        """All of it: the operator's commands change too often for anything else."""
+        return 0.0, self.config.duration
 
 
 class Session:
@@ -70,11 +70,9 @@ class Session:
         self._screen, self._limit = screen, limit
         self._state = state
         self._next_status = 0.0
-        self._pace = pace()
 
     def __call__(self, time: float) -> MotionCommand | None:
         """The command at `time` (s since the start); None ends the drive."""
-        self._pace(time)
         sticks, buttons = self._gamepad.read()
         state = self._teleop.tilt_sticks(self._state, sticks, time)
         for key in (*self._keyboard.read(), *buttons):
@@ -92,52 +90,6 @@ class Session:
 
     def _print(self, text: str) -> None:
         self._screen.write(f"\r\x1b[K{text}\n")
-
-
-class AboveStatus(io.TextIOBase):
-    """Standard error during a drive: messages push the status line down instead of running into it.
-
-    It says that it is no terminal, so that nobody draws a progress bar into the line.
-
-    Args:
-        screen: the terminal.
-    """
-
-    def __init__(self, screen: TextIO) -> None:
-        self._screen = screen
-        self._line = ""
-
-    def isatty(self) -> bool:
-        """No: bars and colours stay out of the way of the status line."""
-        return False
-
-    def write(self, text: str) -> int:
-        """Write whole lines over the status line, which is drawn again below; keep the rest."""
-        *lines, self._line = (self._line + text).split("\n")
-        for line in lines:
-            self._screen.write(f"\r\x1b[K{line}\n")
-        return len(text)
-
-    def flush(self) -> None:
-        """Show what was written."""
-        self._screen.flush()
-
-
-def pace() -> Callable[[float], None]:
-    """A function that waits until the wall clock has come to a time since its first call.
-
-    A run that falls behind is not hurried afterwards: a person drives it.
-    """
-    start: float | None = None
-
-    def wait(time: float) -> None:
-        nonlocal start
-        now = clock.monotonic()
-        if start is None or now > start + time:
-            start = now - time
-        clock.sleep(max(0.0, start + time - now))
-
-    return wait
 
 
 def drive(command: DriveCommand) -> Outcome:
@@ -161,9 +113,10 @@ def drive(command: DriveCommand) -> Outcome:
             screen=screen,
         )
         try:
-            with contextlib.redirect_stderr(AboveStatus(screen)):
-                result = run_commanded(session, resolved, options)
+            # The status line stands where a progress bar would.
+            result = run_commanded(session, resolved, options, Presentation(paced=True, progress=False))
         finally:
             gamepad.close()
             screen.write("\r\x1b[K")
+            screen.flush()
     return outcome_of(result)

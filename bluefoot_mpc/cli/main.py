@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import io
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -14,7 +15,7 @@ from rich.text import Text
 
 from bluefoot_mpc.cli import arguments
 from bluefoot_mpc.cli.messages import keep_traceback, messages_on_stderr
-from bluefoot_mpc.cli.outcome import FAILED, INTERRUPTED, Outcome, to_json
+from bluefoot_mpc.cli.outcome import FAILED, INTERRUPTED, OK, Outcome, to_json
 from bluefoot_mpc.cli.parse import parse
 from bluefoot_mpc.exceptions import BlueFootError
 
@@ -43,11 +44,14 @@ def main(argv: Sequence[str] | None = None, prog: str = "bluefoot") -> int:
     """Run one command line and return its exit status (0, 1, 2, 3 or 130; see the help)."""
     words = list(sys.argv[1:] if argv is None else argv)
     as_json, debug = "--json" in words, "--debug" in words
+    _make_streams_usable()
     try:
         with messages_on_stderr(debug), _only_json() if as_json else contextlib.nullcontext():
             outcome = _execute(words, prog)
     except SystemExit as stop:  # --help
         return int(stop.code or 0)
+    except BrokenPipeError:  # a reader of the help that has seen enough
+        return _leave_quietly(OK)
     except BlueFootError as error:
         return _fail(str(error), error.exit_status, as_json, notes(error))
     except KeyboardInterrupt as stop:
@@ -84,10 +88,28 @@ def _show(outcome: Outcome, as_json: bool) -> int:
                 # Lines of text stay whole: a path or a URDF that was wrapped is of no use.
                 console.print(part, soft_wrap=isinstance(part, (str, Text)), markup=False)
             sys.stdout.flush()
-    except BrokenPipeError:
-        # The reader (head, less) has seen enough; keep the interpreter from flushing again at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    except BrokenPipeError:  # the reader (head, less) has seen enough
+        return _leave_quietly(outcome.status)
+    except OSError as error:  # a full disk, say
+        _leave_quietly(FAILED)
+        return _fail(f"cannot write to standard output: {error.strerror or error}", FAILED, as_json=False)
     return outcome.status
+
+
+def _leave_quietly(status: int) -> int:
+    """Exit status, with standard output turned away, so that nothing is flushed into it at the exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    return status
+
+
+def _make_streams_usable() -> None:
+    """Give the process the streams that it was started without, and let no sign be one too many for them."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - until the exit
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _fail(message: str, status: int, as_json: bool, remarks: Sequence[str] = ()) -> int:

@@ -61,4 +61,6 @@ class _StandardError(logging.Handler):
         elif error is not None:
             where = keep_traceback(error)
             line += f": {type(error).__name__}: {error} (the traceback is in {where}; --debug shows it)"
-        print(line, file=sys.stderr, flush=True)
+        # A status line that a person drives by may stand there: the message takes its place.
+        clear = "\r\x1b[K" if sys.stderr.isatty() else ""
+        print(clear + line, file=sys.stderr, flush=True)

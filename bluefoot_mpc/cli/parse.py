@@ -7,6 +7,7 @@ import dataclasses
 import io
 import re
 from collections.abc import Sequence
+from importlib.metadata import version
 from typing import Any, cast
 
 import tyro
@@ -23,6 +24,12 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 }
 """Commands, and the words that must follow them."""
 
+_DESCRIPTION = (
+    "The BlueFoot quadruped: simulate, walk, replay, drive. "
+    "'bluefoot COMMAND --help' lists a command's options, 'bluefoot --version' tells the version.\n\n"
+    "Exit status: 0 all is well, 1 a criterion does not hold, 2 wrong use, 3 the device refused, "
+    "130 interrupted."
+)
 _MARKERS = (
     tyro.conf.FlagCreatePairsOff,
     tyro.conf.OmitArgPrefixes,
@@ -51,7 +58,7 @@ def parse(argv: Sequence[str], prog: str = "bluefoot") -> arguments.Common:
     Raises:
         UsageError: a value is missing or has the wrong form.
         UnknownNameError: a command or an option does not exist.
-        SystemExit: help was asked for and printed (status 0).
+        SystemExit: help or the version was asked for and printed (status 0).
     """
     _check_command(argv)
     complaint = io.StringIO()
@@ -60,6 +67,7 @@ def parse(argv: Sequence[str], prog: str = "bluefoot") -> arguments.Common:
             parsed = tyro.cli(
                 cast(type[arguments.Common], arguments.Command),
                 prog=prog,
+                description=_DESCRIPTION,
                 args=list(argv),
                 config=_MARKERS,
                 return_unknown_args=True,
@@ -85,8 +93,16 @@ def _check_command(argv: Sequence[str]) -> None:
     words = list(argv)
     if not words:
         raise UsageError(f"a command is missing. Valid: {', '.join(COMMANDS)} (see: bluefoot --help)")
-    if words[0].startswith("-"):
+    if words[0] == "--version":
+        print(f"bluefoot {version('bluefoot-mpc')}")
+        raise SystemExit(0)
+    if words[0] in ("-h", "--help"):
         return
+    if words[0].startswith("-"):
+        raise UsageError(
+            f"{words[0]} stands before the command; options follow it: bluefoot COMMAND {words[0]}. "
+            f"Valid commands: {', '.join(COMMANDS)}"
+        )
     if words[0] not in COMMANDS:
         raise UnknownNameError("command", words[0], COMMANDS)
     inner = COMMANDS[words[0]]

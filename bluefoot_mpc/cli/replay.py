@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 from bluefoot_mpc.cli.arguments import ReplayCommand
-from bluefoot_mpc.cli.outcome import FAILED, OK, Outcome
+from bluefoot_mpc.cli.outcome import FAILED, OK, WRONG_USE, Outcome
 from bluefoot_mpc.exceptions import ConfigurationError, LogError
 from bluefoot_mpc.runtime.log import RunLog, read_log
 from bluefoot_mpc.runtime.replay import RethinkReport, Step, rethink
@@ -18,12 +18,14 @@ from bluefoot_mpc.viz.replay import replay as show_replay
 def replay(command: ReplayCommand) -> Outcome:
     """Describe a log, and show or rethink it as asked."""
     log = read_log(command.log)
+    if not log.frames:
+        raise LogError(f"{log.path} holds no sensor frames: there is nothing to replay")
     data: dict[str, Any] = describe(log)
     lines = [_sentence(data)]
-    status = OK
+    status = WRONG_USE if log.truncated else OK
     if command.rethink:
         report = rethink(log, lambda: _todays_controller(log))
-        status = OK if report.equal else FAILED
+        status = status if report.equal else FAILED
         data["rethink"] = _as_data(report)
         lines.append(str(report))
     if command.html is not None or command.view:
@@ -46,7 +48,7 @@ def _show(command: ReplayCommand, log: RunLog) -> None:
 def describe(log: RunLog) -> dict[str, Any]:
     """What a log holds, in a few figures."""
     run = log.config.get("run", {})
-    duration = log.frames[-1].time - log.frames[0].time if log.frames else 0.0
+    duration = log.frames[-1].time - log.frames[0].time + log.period if log.frames else 0.0
     return {
         "log": log.path,
         "scenario": run.get("scenario"),

@@ -9,6 +9,7 @@ from rich.table import Table
 from bluefoot_mpc.cli.arguments import ListCommand, RunCommand
 from bluefoot_mpc.cli.outcome import Outcome
 from bluefoot_mpc.cli.summary import summary_page
+from bluefoot_mpc.runtime.data import happenings
 from bluefoot_mpc.scenarios import RunOptions, RunResult, scenario_names
 from bluefoot_mpc.scenarios import run as run_scenario
 
@@ -34,5 +35,5 @@ def outcome_of(result: RunResult) -> Outcome:
     return Outcome(
         status=result.exit_status,
         data={**result.summary, **extra},
-        page=summary_page(result.summary, result.criteria, result.folder),
+        page=summary_page(result.summary, result.criteria, result.folder, happenings(result.data.telemetry)),
     )

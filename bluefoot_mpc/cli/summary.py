@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from bluefoot_mpc.runtime.loop import INTERRUPTED
 from bluefoot_mpc.scenarios import Criterion
 
 Summary = Mapping[str, Any]
@@ -28,6 +30,9 @@ _UNITS = {
     "w": "W",
 }
 _NOT_SHOWN = ("window_s",)
+_CHANGE = re.compile(r"(mode|gait) \S+ -> \S+$")
+"""What is no news: a change without a reason was commanded."""
+_EVENTS_SHOWN = 5
 _FILES = (
     ("report", "report.html"),
     ("log", "log.mcap"),
@@ -36,16 +41,35 @@ _FILES = (
 )
 
 
-def summary_page(summary: Summary, criteria: Sequence[Criterion], folder: Path) -> tuple[RenderableType, ...]:
+def summary_page(
+    summary: Summary,
+    criteria: Sequence[Criterion],
+    folder: Path,
+    events: Sequence[tuple[float, str]] = (),
+) -> tuple[RenderableType, ...]:
     """One page on a finished run.
 
     Args:
         summary: content of summary.json.
         criteria: the scenario's conditions of success.
         folder: where the run's files lie.
+        events: time (s) and text of what the controller reported.
     """
     heading = Text.assemble((_title(summary), "bold"), "\n")
-    return (heading, _table(_rows(summary)), _verdict(summary, criteria), _files(folder))
+    happened = [event for event in events if not _CHANGE.match(event[1])]
+    told = (_events(happened),) if happened else ()
+    return (heading, _table(_rows(summary)), _verdict(summary, criteria), *told, _files(folder))
+
+
+def _events(events: Sequence[tuple[float, str]]) -> Text:
+    """The first of each kind of thing out of the ordinary; the report has all of them."""
+    kinds: dict[str, list[str]] = {}
+    for time, text in events:
+        kinds.setdefault(text.partition(":")[0], []).append(f"at {time:.2f} s: {text}")
+    lines = [first + (f" (repeated: {len(others)})" if others else "") for first, *others in kinds.values()]
+    if len(lines) > _EVENTS_SHOWN:
+        lines[_EVENTS_SHOWN:] = [f"... and {len(lines) - _EVENTS_SHOWN} other things, see the report"]
+    return Text("\n".join(lines) + "\n", style="yellow")
 
 
 def _title(summary: Summary) -> str:
@@ -84,9 +108,9 @@ def _rows(summary: Summary) -> list[Row]:
 
 def _table(rows: list[Row]) -> Table:
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 1))
-    table.add_column(style="cyan")
+    table.add_column(style="cyan", no_wrap=True)
     table.add_column(justify="right", no_wrap=True)
-    table.add_column(style="dim", no_wrap=True)
+    table.add_column(style="dim")
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
     return table
@@ -100,6 +124,8 @@ def _verdict(summary: Summary, criteria: Sequence[Criterion]) -> Text:
     if all(criterion.holds for criterion in criteria):
         return text.append("OK", "bold green").append(": every criterion of the scenario holds\n")
     reason = summary.get("stop_reason")
+    if reason == INTERRUPTED:
+        return text.append("INTERRUPTED", "bold yellow").append(": the robot sat down, the log is kept\n")
     ended = "" if reason in (None, "completed") else f"; the run ended early: {reason}"
     return text.append("FAILED", "bold red").append(f": a criterion of the scenario does not hold{ended}\n")
 
@@ -112,7 +138,8 @@ def _files(folder: Path) -> Text:
 def _number(value: Any, digits: int) -> str:
     if not isinstance(value, (int, float)) or isinstance(value, bool) or not math.isfinite(value):
         return _NONE
-    return f"{value:.{digits}f}"
+    text = f"{value:.{digits}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
 
 
 def _scaled(value: Any, factor: float, digits: int, unit: str) -> str:

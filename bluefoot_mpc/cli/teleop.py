@@ -96,6 +96,9 @@ class Teleop:
             key: a lower-case letter, ``"up"``, ``"down"``, ``"left"``, ``"right"`` or ``"space"``.
             time: s, now.
         """
+        if self._is_stopped(state, time):
+            # Whoever comes back must not find the robot walking off with the first key.
+            state = _stopped(state)
         state = replace(state, last_input=time)
         if state.ending is not None:
             return state
@@ -128,7 +131,7 @@ class Teleop:
             return None
         idle = time - state.last_input
         mode, (forward, left, turn) = state.mode, self.wanted(state)
-        if idle >= self.config.timeout:
+        if self._is_stopped(state, time):
             forward = left = turn = 0.0
             if mode is Mode.WALK and idle >= self.config.timeout + self.config.stand_after:
                 mode = Mode.STAND
@@ -151,8 +154,9 @@ class Teleop:
         remark = ""
         if state.ending is not None:
             remark = "  sitting down"
-        elif state.mode is Mode.WALK and time - state.last_input >= self.config.timeout:
-            remark = "  NO KEY: stopped (any key goes on)"
+        elif state.mode is Mode.WALK and self._is_stopped(state, time):
+            forward = left = turn = 0.0
+            remark = "  NO KEY: stopped"
         roll, pitch, yaw = (math.degrees(angle) for angle in state.rpy)
         return (
             f"{time:6.1f} s  {state.mode.value:<5} {state.gait:<4}  "
@@ -160,6 +164,10 @@ class Teleop:
             f"{math.degrees(turn):+5.1f} °/s  trunk {roll:+.0f} {pitch:+.0f} {yaw:+.0f}° "
             f"{state.height * 1e3:+.0f} mm{remark}"
         )
+
+    def _is_stopped(self, state: TeleopState, time: float) -> bool:
+        """True when the dead man's handle has acted: nobody gave a sign for too long."""
+        return time - state.last_input >= self.config.timeout
 
     def _faster(self, velocity: Vector3, step: Vector3) -> Vector3:
         sizes = (self.config.speed_step, self.config.speed_step, self.config.yaw_rate_step)

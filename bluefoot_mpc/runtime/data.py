@@ -7,6 +7,7 @@ the loop that just ended or from a file (`bluefoot_mpc.runtime.log.RunLog`).
 from __future__ import annotations
 
 import operator
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,6 +19,7 @@ from bluefoot_mpc.runtime.versions import installed_versions
 from bluefoot_mpc.types import (
     FloatArray,
     JointCommand,
+    Mode,
     MotionCommand,
     SafetyRequest,
     SensorFrame,
@@ -45,6 +47,19 @@ class CommandRecord:
     motion: MotionCommand
     safety: SafetyRequest
     joints: JointCommand
+
+
+def happenings(telemetry: Sequence[Telemetry]) -> list[tuple[float, str]]:
+    """Time (s) and text of everything that the controller reported, and of its changes of gait."""
+    found: list[tuple[float, str]] = []
+    gait = ""
+    for record in telemetry:
+        found += [(record.time, event) for event in record.events]
+        walks = record.mode is Mode.WALK
+        if walks and gait and record.motion.gait != gait:
+            found.append((record.time, f"gait {gait} -> {record.motion.gait}"))
+        gait = record.motion.gait if walks else ""
+    return found
 
 
 @dataclass(kw_only=True, slots=True)

@@ -36,10 +36,12 @@ from bluefoot_mpc.types import (
 log = logging.getLogger(__name__)
 
 INTERRUPTED = "interrupted"
+_ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 AFTER_FALL = 1.0
 """s that are still recorded after a fall, limp."""
 REST_TIMEOUT = 6.0
-"""s that an interrupted robot gets to end its gait, sit and go limp."""
+"""s that a robot gets to end its gait, sit and go limp when its run is cut short."""
+_REST = MotionCommand(mode=Mode.OFF)
 RAMP_DOWN = 1.0
 """s over which torque is taken away when the controller itself has failed."""
 
@@ -119,18 +121,19 @@ def _ticks(
     interrupted: threading.Event,
 ) -> str:
     start = frame.time
-    wanted: MotionCommand | None = MotionCommand()
+    cut_short: str | None = None
     resting_since = stopping_since = float("inf")
     while True:
         now = frame.time - start
-        if interrupted.is_set():
+        motion: MotionCommand | None = _REST
+        if cut_short is None and interrupted.is_set():
+            cut_short = INTERRUPTED
+        elif cut_short is None:
+            motion, cut_short = _ask(source, now)
+        if cut_short is not None:
             resting_since = min(resting_since, now)
-            wanted = MotionCommand(mode=Mode.OFF)
-        else:
-            wanted = source(now)
-        if wanted is None:
+        if motion is None:
             return COMPLETED
-        motion = wanted
         safety = robot.request
         tick_start = time.perf_counter_ns()
         try:
@@ -149,8 +152,20 @@ def _ticks(
             stopping_since = min(stopping_since, now)
             if limp and now - stopping_since >= AFTER_FALL:
                 return _safe_reason(data)
-        if interrupted.is_set() and (limp or now - resting_since > REST_TIMEOUT):
-            return INTERRUPTED
+        if cut_short is not None and (limp or now - resting_since > REST_TIMEOUT):
+            return cut_short
+
+
+def _ask(source: CommandSource, now: float) -> tuple[MotionCommand | None, str | None]:
+    """The wanted motion, or rest and the reason why the run must end: scenarios are users' code."""
+    try:
+        motion = source(now)
+        if motion is not None and not isinstance(motion, MotionCommand):
+            raise TypeError(f"the command must be a MotionCommand, or None to end the run, not {motion!r}")
+    except Exception as error:
+        log.exception("the scenario failed at %.2f s", now)
+        return _REST, f"scenario error: {type(error).__name__}: {error}"
+    return motion, None
 
 
 def _record(
@@ -197,7 +212,7 @@ def _safe_reason(data: RunData) -> str:
 
 @contextmanager
 def _interruptible() -> Iterator[threading.Event]:
-    """Turn the first Ctrl-C (or a termination) into an event; a second one interrupts for real."""
+    """Turn the first Ctrl-C (or termination, or hang-up) into an event; a second one interrupts for real."""
     event = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield event
@@ -208,7 +223,9 @@ def _interruptible() -> Iterator[threading.Event]:
             raise KeyboardInterrupt
         event.set()
 
-    previous = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    # What is ignored stays so: nohup, and commands in the background of a script.
+    heard = [number for number in _ENDINGS if signal.getsignal(number) is not signal.SIG_IGN]
+    previous = {number: signal.signal(number, handle) for number in heard}
     try:
         yield event
     finally:

@@ -21,7 +21,7 @@ import orjson
 from bluefoot_mpc.model.parameters import GRAVITY, load_parameters
 from bluefoot_mpc.runtime import metrics
 from bluefoot_mpc.runtime.data import COMPLETED, RunData
-from bluefoot_mpc.runtime.window import Window, cut_window, measurement_window
+from bluefoot_mpc.runtime.window import Window, cut_window, measurement_window, wanted_commands
 from bluefoot_mpc.types import Mode
 
 if TYPE_CHECKING:
@@ -63,21 +63,23 @@ def summarize(
         figures: the scenario's own figures, added to ``figures``.
     """
     start, end = window if window is not None else measurement_window(run)
+    has_fallen, commands = fell(run), wanted_commands(run)
+    if commands:
+        end = min(end, commands[-1].time)
     cut = cut_window(run, start, end)
-    has_fallen = fell(run)
     summary: dict[str, Any] = {
         **_identity(run),
         "duration_s": round(duration(run), 9),
         "fell": has_fallen,
         "success": (run.stop_reason == COMPLETED and not has_fallen) if success is None else success,
         "stop_reason": run.stop_reason,
-        "speed_ref_mps": float(np.hypot(*run.commands[-1].motion.velocity)) if run.commands else None,
+        "speed_ref_mps": float(np.hypot(*commands[-1].motion.velocity)) if commands else None,
         "servo_temp_max_c": _hottest(run),
         **_ticks(run),
         "real_time_factor": run.real_time_factor,
         "config_sha256": config_sha256(run.config),
         "versions": dict(run.versions),
-        "figures": {"window_s": [start, end]},
+        "figures": {"window_s": None if cut is None else [start, end]},
     }
     if cut is not None:
         summary |= _motion(cut) | _attitude(cut) | _balance(cut, _foot_radius(run, model)) | _effort(cut)
@@ -120,7 +122,8 @@ def config_sha256(config: Mapping[str, Any]) -> str:
 
 def _identity(run: RunData) -> dict[str, Any]:
     named = run.config.get("run", {})
-    gait = run.commands[-1].motion.gait if any(c.motion.mode is Mode.WALK for c in run.commands) else None
+    walked = any(record.motion.mode is Mode.WALK for record in run.commands)
+    gait = wanted_commands(run)[-1].motion.gait if walked else None
     return {key: named.get(key) for key in ("scenario", "seed", "robot", "controller")} | {"gait": gait}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from bluefoot_mpc.runtime import metrics
-from bluefoot_mpc.runtime.data import CommandRecord, RunData
-from bluefoot_mpc.types import BoolArray, FloatArray, MotionCommand, Telemetry, TruthSample
+from bluefoot_mpc.runtime.data import COMPLETED, CommandRecord, RunData
+from bluefoot_mpc.types import BoolArray, FloatArray, Mode, MotionCommand, Telemetry, TruthSample
 
 SETTLING = 2.0
 """s after the last change of command before measuring starts."""
@@ -22,15 +23,26 @@ _TIME_TOLERANCE = 1e-6
 def measurement_window(run: RunData) -> tuple[float, float]:
     """Start and end (s, time of the frames): from 2 s after the last change of command to the end.
 
-    Start lies behind the end where the command changes until too late.
+    Start lies behind the end where the command changes until too late. The
+    coming to rest of a run that was cut short does not count.
     """
-    if not run.commands:
+    commands = wanted_commands(run)
+    if not commands:
         return 0.0, 0.0
-    changed = run.commands[0].time
-    for before, now in zip(run.commands[:-1], run.commands[1:], strict=True):
+    changed = commands[0].time
+    for before, now in itertools.pairwise(commands):
         if not same_motion(before.motion, now.motion):
             changed = now.time
-    return changed + SETTLING, run.commands[-1].time
+    return changed + SETTLING, commands[-1].time
+
+
+def wanted_commands(run: RunData) -> Sequence[CommandRecord]:
+    """What was commanded, without the order to rest that ends a run which is cut short."""
+    end = len(run.commands)
+    if run.stop_reason != COMPLETED:
+        while end and run.commands[end - 1].motion.mode is Mode.OFF:
+            end -= 1
+    return run.commands[:end] or run.commands
 
 
 def same_motion(a: MotionCommand, b: MotionCommand) -> bool:

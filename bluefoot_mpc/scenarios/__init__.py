@@ -3,10 +3,11 @@
 from bluefoot_mpc.scenarios.base import Criterion, Scenario, ScenarioConfig
 from bluefoot_mpc.scenarios.options import RunOptions
 from bluefoot_mpc.scenarios.registry import find_scenario, scenario_names
-from bluefoot_mpc.scenarios.runner import RunResult, pipeline_from_log, run, run_commanded
+from bluefoot_mpc.scenarios.runner import Presentation, RunResult, pipeline_from_log, run, run_commanded
 
 __all__ = [
     "Criterion",
+    "Presentation",
     "RunOptions",
     "RunResult",
     "Scenario",

@@ -8,10 +8,16 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.model.robot import RobotModel
+from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.settings import require_positive
-from bluefoot_mpc.sim.config import SimConfig
+from bluefoot_mpc.sim.config import SimConfig, WorldConfig
 from bluefoot_mpc.types import MotionCommand
+
+MAX_DURATION = 7200.0
+"""s; a run is held in memory for its summary and report, about 1.3 GB an hour."""
+NOT_MEASURED = "not measured: the run ended within 2 s of the last change of command"
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -22,6 +28,8 @@ class ScenarioConfig:
 
     def __post_init__(self) -> None:
         require_positive(duration=self.duration)
+        if self.duration > MAX_DURATION:
+            raise ConfigurationError(f"duration = {self.duration:g} s must be at most {MAX_DURATION:g} s")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -32,11 +40,15 @@ class Criterion:
         name: what is asked, as a person would say it.
         holds: True when it does.
         detail: the figure that was seen.
+        figure: key of the summary's figure that it judges; may be empty.
+        goal: what that figure has to be, in few words.
     """
 
     name: str
     holds: bool
     detail: str
+    figure: str = ""
+    goal: str = ""
 
 
 class Scenario(ABC):
@@ -44,12 +56,19 @@ class Scenario(ABC):
 
     A scenario sees the time only: what it commands cannot depend on the
     simulator's truth.
+
+    Attributes:
+        name: what it is called on the command line.
+        Config: its configuration.
+        config: the configuration in force.
+        world: the world that it runs in, for criteria that depend on the ground.
     """
 
     name: ClassVar[str]
     Config: ClassVar[type[ScenarioConfig]] = ScenarioConfig
 
     config: Any
+    world: WorldConfig = WorldConfig()
 
     def __init__(self, config: Any = None) -> None:
         self.config = config if config is not None else self.Config()
@@ -73,6 +92,10 @@ class Scenario(ABC):
         """The conditions of success, judged from the run's summary."""
         return [not_fallen(summary)]
 
+    def figures(self, run: RunData) -> Mapping[str, Any]:
+        """Figures of its own for the summary, by name; by default none."""
+        return {}
+
     def source(self, time: float) -> MotionCommand | None:
         """The command, or None when the scenario is over."""
         return None if time >= self.config.duration else self.command(time)
@@ -92,15 +115,21 @@ class Scenario(ABC):
 
 
 def not_fallen(summary: Mapping[str, Any]) -> Criterion:
-    """The robot did not fall and was not stopped."""
+    """The robot did not fall, and nothing stopped it before the end."""
     reason = str(summary["stop_reason"])
-    holds = not summary["fell"] and reason == "completed"
-    return Criterion(name="stays on its feet", holds=holds, detail="yes" if holds else reason)
+    if summary["fell"]:
+        return Criterion(name="stays on its feet", holds=False, detail=f"it fell ({reason})")
+    holds = reason == "completed"
+    return Criterion(name="stays on its feet to the end", holds=holds, detail="yes" if holds else reason)
 
 
 def at_most(summary: Mapping[str, Any], key: str, limit: float, name: str, unit: str) -> Criterion:
     """A figure of the summary is at most `limit`; a missing one does not hold."""
     value = summary.get(key)
-    holds = value is not None and value <= limit
-    shown = "unknown" if value is None else f"{value:.2f} {unit}"
-    return Criterion(name=f"{name} at most {limit:g} {unit}", holds=holds, detail=shown)
+    return Criterion(
+        name=f"{name} at most {limit:g} {unit}",
+        holds=value is not None and value <= limit,
+        detail=NOT_MEASURED if value is None else f"{value:.2f} {unit}",
+        figure=key,
+        goal=f"≤ {limit:g} {unit}",
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -78,13 +79,16 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
         table = merge(table, parse_override(override))
     table = _without_run(table)
     stage_names = [f.name for f in fields(StageConfig)]
-    for key in table:
+    for key, value in table.items():
         if key not in (*stage_names, "scenario", "model"):
             raise UnknownNameError("configuration section", key, (*stage_names, "scenario", "model"))
+        if not isinstance(value, Mapping):
+            raise ConfigurationError(f"{key} must be a table, not {value!r}")
     scenario_table = merge(table.get("scenario", {}), _scenario_options(scenario, options))
     made = scenario(build(scenario.Config, scenario_table, "scenario"))
     stages = build(StageConfig, {key: table[key] for key in stage_names if key in table})
     sim = build(SimConfig, merge(to_table(stages.sim), _sim_options(options)), "sim")
+    made.world = sim.world
     return Resolved(
         run=RunSection(
             scenario=scenario.name, seed=options.seed, robot=options.robot, controller=options.controller

@@ -12,6 +12,8 @@ ROBOTS = ("sim",)
 CONTROLLERS = ("cpg",)
 RANDOMIZATIONS = ("none", "standard")
 GAITS = ("trot", "walk")
+MAX_SEED = 2**63 - 1
+"""Largest whole number that TOML and the log can hold."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -62,8 +64,8 @@ class RunOptions:
             _require_positive(name, getattr(self, name))
         if self.push_time is not None and not (math.isfinite(self.push_time) and self.push_time >= 0.0):
             raise ConfigurationError(f"--push-time = {self.push_time} must not be negative (seconds)")
-        if self.seed < 0:
-            raise ConfigurationError(f"--seed = {self.seed} must not be negative")
+        if not 0 <= self.seed <= MAX_SEED:
+            raise ConfigurationError(f"--seed = {self.seed} must lie in 0..{MAX_SEED}")
 
 
 def _require_choice(kind: str, value: str, valid: tuple[str, ...]) -> None:

@@ -14,7 +14,15 @@ from bluefoot_mpc.control.config import ControlConfig
 from bluefoot_mpc.control.targets import JointTargets
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.model.robot import RobotModel
-from bluefoot_mpc.scenarios.base import Criterion, Scenario, ScenarioConfig, at_most, not_fallen
+from bluefoot_mpc.runtime.data import RunData
+from bluefoot_mpc.scenarios.base import (
+    NOT_MEASURED,
+    Criterion,
+    Scenario,
+    ScenarioConfig,
+    at_most,
+    not_fallen,
+)
 from bluefoot_mpc.settings import require_nonnegative, require_positive
 from bluefoot_mpc.types import FloatArray, MotionCommand, PostureReference, TrunkPose
 
@@ -127,8 +135,32 @@ class Pose(Scenario):
             not_fallen(summary),
             at_most(summary, "roll_rms_deg", TRACKING_DEG, "roll error RMS", "deg"),
             at_most(summary, "pitch_rms_deg", TRACKING_DEG, "pitch error RMS", "deg"),
+            self._in_place(summary),
         ]
 
+    def figures(self, run: RunData) -> Mapping[str, Any]:
+        """RMS distance of the trunk from where it was commanded, from its place before the first pose."""
+        time = np.array([sample.time for sample in run.truth])
+        before = (time >= 0.5 * self.config.stand_time) & (time < self.config.stand_time)
+        after = time >= self.config.stand_time
+        if not before.any() or not after.any():
+            return {}
+        position = run.stack("truth", "q")[:, :3]
+        wanted = np.array([record.motion.trunk.position for record in run.commands[: len(time)]])
+        error = (position - position[before].mean(axis=0) - wanted)[after]
+        return {POSITION_ERROR: float(np.sqrt((error**2).sum(axis=1).mean()))}
 
+    def _in_place(self, summary: Mapping[str, Any]) -> Criterion:
+        seen = (summary.get("figures") or {}).get(POSITION_ERROR)
+        return Criterion(
+            name=f"trunk position error RMS at most {1e3 * TRACKING:g} mm",
+            holds=seen is not None and seen <= TRACKING,
+            detail=NOT_MEASURED if seen is None else f"{1e3 * seen:.1f} mm",
+        )
+
+
+POSITION_ERROR = "trunk_position_error_rms_m"
+TRACKING = 0.010
+"""m, RMS error of the trunk's place while it follows a slow sine."""
 TRACKING_DEG = 2.5
 """RMS error of the trunk's angles while it follows a slow sine through soft servos."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+import traceback
 from pathlib import Path
 
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
-from bluefoot_mpc.scenarios.base import Scenario
+from bluefoot_mpc.scenarios.base import Scenario, ScenarioConfig
 from bluefoot_mpc.scenarios.posing import Pose, Stand
 from bluefoot_mpc.scenarios.walking import Push, Transition, Turn, Walk
 
@@ -47,8 +48,8 @@ def _from_script(path: Path) -> type[Scenario]:
     sys.modules[module_name] = module
     try:
         spec.loader.exec_module(module)
-    except (SyntaxError, ImportError, NameError, TypeError, AttributeError, ValueError) as error:
-        raise ConfigurationError(f"{path} failed to load: {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:  # Whatever is wrong in it, it is the user's own code.
+        raise ConfigurationError(f"{_place(path, error)} failed to load: {_what(error)}") from error
     found = [
         value
         for value in vars(module).values()
@@ -57,4 +58,31 @@ def _from_script(path: Path) -> type[Scenario]:
     if len(found) != 1:
         names = ", ".join(scenario.__name__ for scenario in found) or "none"
         raise ConfigurationError(f"{path} must define exactly one subclass of Scenario; found: {names}")
+    _require_complete(found[0], path)
     return found[0]
+
+
+def _require_complete(scenario: type[Scenario], path: Path) -> None:
+    name = getattr(scenario, "name", None)
+    if not isinstance(name, str) or not name or "/" in name:
+        raise ConfigurationError(
+            f'{path}: {scenario.__name__} needs a name: a class attribute, name = "my_scenario"'
+        )
+    missing = ", ".join(sorted(getattr(scenario, "__abstractmethods__", ())))
+    if missing:
+        raise ConfigurationError(f"{path}: {scenario.__name__} lacks the method: {missing}")
+    if not (isinstance(scenario.Config, type) and issubclass(scenario.Config, ScenarioConfig)):
+        raise ConfigurationError(f"{path}: {scenario.__name__}.Config must be a subclass of ScenarioConfig")
+
+
+def _place(path: Path, error: BaseException) -> str:
+    """The script, and the line in it that was being executed."""
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [frame.lineno for frame in frames if Path(frame.filename).resolve() == path.resolve()]
+    return f"{path}, line {lines[-1]}," if lines else str(path)
+
+
+def _what(error: BaseException) -> str:
+    if isinstance(error, SystemExit):
+        return "it ends the program (sys.exit) while it is loaded"
+    return f"{type(error).__name__}: {error}".rstrip(": ")

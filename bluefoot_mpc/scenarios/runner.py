@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import logging
+import itertools
 import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,7 +35,21 @@ from bluefoot_mpc.sim.robot import SimRobot
 from bluefoot_mpc.viz.live import LiveView
 from bluefoot_mpc.viz.report import write_report
 
-log = logging.getLogger(__name__)
+LOG, SUMMARY, REPORT, CONFIG = "log.mcap", "summary.json", "report.html", "config.toml"
+"""Files that a run writes into its folder."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Presentation:
+    """How a run looks while it happens.
+
+    Attributes:
+        paced: one second of the run takes a second at least; None: only with the live view.
+        progress: a bar on the terminal, where there is one.
+    """
+
+    paced: bool | None = None
+    progress: bool = True
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -98,41 +114,93 @@ def simulate(name_or_path: str, options: RunOptions) -> RunResult:
     return _judge(data, resolved, model, Path())
 
 
-def run_commanded(source: CommandSource, resolved: Resolved, options: RunOptions) -> RunResult:
+def run_commanded(
+    source: CommandSource,
+    resolved: Resolved,
+    options: RunOptions,
+    presentation: Presentation | None = None,
+) -> RunResult:
     """Run with any source of commands: a scenario's, or a person at the keyboard.
 
     Args:
         source: wanted motion over time; None ends the run.
         resolved: the configuration.
         options: output folder, view and report.
+        presentation: pace and progress; defaults where missing.
+
+    Raises:
+        ConfigurationError: the robot cannot do what is asked, or a file cannot be written.
+        LogError: the log cannot be written.
     """
+    presentation = presentation or Presentation()
     model = RobotModel(resolved.parameters)
     resolved.scenario.check(model, resolved.stages.control)
     simulator = SimRobot(model, resolved.stages.sim, resolved.run.seed)
     table = {**resolved.table(), "drawn": simulator.drawn}
     folder = _make_folder(options, resolved.run.scenario)
-    (folder / "config.toml").write_text(dump_toml(table), encoding="utf-8")
-    view = LiveView(model) if options.view else None
-    robot = simulator if view is None else PacedRobot(simulator)
-    progress = Progress(resolved.scenario.config.duration)
-    observers: list[Observer] = [lambda frame, output, truth: progress.update(frame.time)]
-    if view is not None:
-        observers.append(view.update)
-    try:
-        with Recorder(folder / "log.mcap", table, simulator.period) as recorder, progress:
-            hooks = LoopHooks(recorder=recorder, truth=simulator.truth, observers=tuple(observers))
-            data = _drive(robot, model, resolved, source, hooks, table)
-            recorder.finish(data.stop_reason, data.real_time_factor)
-    finally:
-        if view is not None:
-            view.close()
-    result = _judge(data, resolved, model, folder)
-    text = orjson.dumps(result.summary, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY)
-    (folder / "summary.json").write_bytes(text + b"\n")
-    if options.report:
-        checks = [dataclasses.asdict(criterion) for criterion in result.criteria]
-        write_report(data, result.summary, model, folder / "report.html", checks)
+    with _writing(folder / CONFIG):
+        (folder / CONFIG).write_text(dump_toml(table), encoding="utf-8")
+    with _log_in(folder):
+        with _observers(model, resolved, options, presentation) as observers:
+            paced = options.view if presentation.paced is None else presentation.paced
+            robot = PacedRobot(simulator) if paced else simulator
+            with Recorder(folder / LOG, table, simulator.period) as recorder:
+                hooks = LoopHooks(recorder=recorder, truth=simulator.truth, observers=observers)
+                data = _drive(robot, model, resolved, source, hooks, table)
+                recorder.finish(data.stop_reason, data.real_time_factor)
+        result = _judge(data, resolved, model, folder)
+        _write_results(result, model, options.report)
     return result
+
+
+@contextmanager
+def _observers(
+    model: RobotModel, resolved: Resolved, options: RunOptions, presentation: Presentation
+) -> Iterator[tuple[Observer, ...]]:
+    """Live view and progress bar, as wanted."""
+    with ExitStack() as stack:
+        observers: list[Observer] = []
+        if presentation.progress:
+            progress = stack.enter_context(Progress(resolved.scenario.config.duration))
+            observers.append(lambda frame, output, truth: progress.update(frame.time))
+        if options.view:
+            view = LiveView(model)
+            stack.callback(view.close)
+            observers.append(view.update)
+        yield tuple(observers)
+
+
+def _write_results(result: RunResult, model: RobotModel, report: bool) -> None:
+    text = orjson.dumps(result.summary, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY)
+    with _writing(result.folder / SUMMARY):
+        (result.folder / SUMMARY).write_bytes(text + b"\n")
+    if not report:
+        return
+    checks = [dataclasses.asdict(criterion) for criterion in result.criteria]
+    with _writing(result.folder / REPORT):
+        write_report(result.data, result.summary, model, result.folder / REPORT, checks)
+
+
+@contextmanager
+def _writing(file: Path) -> Iterator[None]:
+    """Turn what hinders writing a file into one message; half a file is not left behind."""
+    try:
+        yield
+    except OSError as error:
+        with suppress(OSError):
+            file.unlink()
+        raise ConfigurationError(f"cannot write {file}: {error.strerror or error}") from error
+
+
+@contextmanager
+def _log_in(folder: Path) -> Iterator[None]:
+    """Tell with any error where the log lies that was written until then."""
+    try:
+        yield
+    except BaseException as error:
+        if (folder / LOG).is_file():
+            error.add_note(f"what was recorded until then is in {folder / LOG}")
+        raise
 
 
 def _drive(
@@ -172,16 +240,33 @@ def pipeline_from_log(data: RunData) -> Pipeline:
 
 
 def _judge(data: RunData, resolved: Resolved, model: RobotModel, folder: Path) -> RunResult:
-    summary = summarize(data, model, window=resolved.scenario.window())
-    criteria = resolved.scenario.criteria(summary)
+    scenario = resolved.scenario
+    summary = summarize(data, model, window=scenario.window(), figures=scenario.figures(data))
+    criteria = scenario.criteria(summary)
     summary["success"] = success = all(criterion.holds for criterion in criteria)
     return RunResult(summary=summary, folder=folder, criteria=criteria, success=success, data=data)
 
 
 def _make_folder(options: RunOptions, scenario: str) -> Path:
+    """The folder of a run: the one asked for, without an earlier run's results, or a new one."""
     folder = options.out or Path("runs") / f"{time.strftime('%Y%m%d-%H%M%S')}-{scenario}"
     try:
+        if options.out is None:
+            return _new_folder(folder)
         folder.mkdir(parents=True, exist_ok=True)
+        for name in (LOG, SUMMARY, REPORT, CONFIG):
+            (folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise ConfigurationError(f"cannot write to --out {folder}: {error.strerror or error}") from error
+    return folder
+
+
+def _new_folder(wanted: Path) -> Path:
+    """A folder that nobody else has: two runs may start in the same second."""
+    wanted.parent.mkdir(parents=True, exist_ok=True)
+    for number in itertools.count(1):
+        folder = wanted if number == 1 else wanted.with_name(f"{wanted.name}-{number}")
+        with suppress(FileExistsError):
+            folder.mkdir()
+            break
     return folder

@@ -136,7 +136,8 @@ def footfall(series: RunSeries, period: float) -> Panel:
         height=230,
         wide=True,
         window=window[1] - window[0],
-        caption=f"Wide pale bars: the gait wants the foot to stand. Narrow bars: it does ({source}).",
+        caption=f"Wide pale bars: the gait wants the foot to stand. Narrow bars: it does ({source}). "
+        "Turns its pages with the replay.",
     )
 
 

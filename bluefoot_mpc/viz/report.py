@@ -38,7 +38,8 @@ def write_report(
         summary: the run's figures, as in ``summary.json``.
         robot: the robot that ran.
         path: file to write.
-        checks: the scenario's criteria: ``name``, ``holds`` and ``detail`` of each.
+        checks: the scenario's criteria: ``name``, ``holds`` and ``detail`` of each, ``figure`` and ``goal``
+            of those that judge a figure of the summary.
     """
     path.write_text(report_html(run, summary, robot, checks), encoding="utf-8")
 
@@ -62,7 +63,7 @@ def report_html(
         verdict=judged,
         facts=facts(summary),
         checks=checks,
-        tiles=tiles(summary, stall_torque, run.period),
+        tiles=tiles(summary, stall_torque, run.period, checks),
         has_ticks=has_ticks,
         has_truth=series.has_truth,
         plots_follow=True,
@@ -158,7 +159,7 @@ def _events(series: RunSeries) -> dict[str, Any]:
         event["label"] = f"{event['time']:.2f} s"
         if event["count"] > 1:
             event["text"] += f" (for {event['end'] - event['time']:.2f} s, {event['count']} ticks)"
-    caption = "Mode changes, limits met and pushes; press a time to go there in the replay."
+    caption = "Changes of mode and gait, limits met and pushes; press a time to go there in the replay."
     if not shown:
         caption = "Nothing out of the ordinary happened."
     elif len(grouped) > len(shown):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bluefoot_mpc.geometry import rotation_from_quaternion, rotation_z, rpy_from_quaternion
-from bluefoot_mpc.runtime.data import RunData
+from bluefoot_mpc.runtime.data import RunData, happenings
 from bluefoot_mpc.runtime.metrics import mass_from_load, mass_in_motion, zero_moment_points
 from bluefoot_mpc.types import BoolArray, FloatArray, Telemetry, TruthSample
 
@@ -140,7 +140,9 @@ def extract(run: RunData, stall_torque: float) -> RunSeries:
         power=_array([t.electrical_power for t in truth], n) if has_truth else nothing[:, 0],
         push=_array([t.external_force for t in truth], n, 3) if has_truth else np.zeros((n, 3)),
         tick_us=_array([t.tick_us for t in telemetry], n),
-        mode=tuple(str(t.mode) for t in telemetry), walking=walking, events=_events(telemetry, start),
+        mode=tuple(str(t.mode) for t in telemetry), walking=walking, events=tuple(
+            (when - start, what) for when, what in happenings(telemetry)
+        ),
     )  # fmt: skip
 
 
@@ -213,7 +215,3 @@ def _in_heading(quaternion: FloatArray, velocity_in_base: FloatArray) -> FloatAr
     rotation = rotation_from_quaternion(quaternion)
     yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
     return np.asarray((rotation_z(-yaw) @ rotation @ velocity_in_base)[:2])
-
-
-def _events(telemetry: Sequence[Telemetry], start: float) -> tuple[tuple[float, str], ...]:
-    return tuple((float(t.time) - start, event) for t in telemetry for event in t.events)

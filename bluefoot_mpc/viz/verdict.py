@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 _MARKS = {"good": "✓", "warn": "!", "bad": "✕", "": ""}
 _MINUS = "\u2212"
+_STOPPED_AT = re.compile(r"stopped at (\d+\.?\d*) s:")
 
 _DID = {
     "stand": "stood",
@@ -80,8 +82,10 @@ def verdict(summary: Mapping[str, Any], checks: Sequence[Mapping[str, Any]] = ()
     failed = [check for check in checks if not check.get("holds")]
     if summary.get("fell"):
         why = reason if reason != "completed" else "the trunk or a link above a foot touched the ground"
+        when = _STOPPED_AT.match(reason)
+        after = f"at {when[1]} s" if when else f"in a run of {lasted}"
         return Verdict(
-            status="bad", word="Fell", headline=f"The robot fell after {lasted}", explanation=_sentence(why)
+            status="bad", word="Fell", headline=f"The robot fell {after}", explanation=_sentence(why)
         )
     if reason == "interrupted":
         return Verdict(
@@ -127,59 +131,82 @@ def facts(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     return found
 
 
-def tiles(summary: Mapping[str, Any], stall_torque: float, period: float) -> list[Tile]:
+def tiles(
+    summary: Mapping[str, Any],
+    stall_torque: float,
+    period: float,
+    checks: Sequence[Mapping[str, Any]] = (),
+) -> list[Tile]:
     """Key figures with their goals; figures that a run does not have are left out.
 
-    Goals: speed within 10 %, drift under 10 % of the distance, 8 mm of swing
-    clearance, attitude by gait and speed, servos below their limits.
+    The scenario's criteria say what its figures should be; servos, estimate and
+    timing have goals of their own.
 
     Args:
         summary: the summary.
         stall_torque: N·m.
         period: s, command period.
+        checks: the scenario's criteria; one with a ``figure`` judges that tile by its ``goal``.
     """
+    goals = {
+        check["figure"]: _Goal(str(check["goal"]), _always if check["holds"] else _never)
+        for check in checks
+        if check.get("figure")
+    }
     walks = bool(summary.get("speed_ref_mps"))
     found = [
-        *(_way_tiles(summary) if walks else []),
-        *_attitude_tiles(summary),
-        *_balance_tiles(summary),
+        *(_way_tiles(summary, goals) if walks else []),
+        *_attitude_tiles(summary, goals),
+        *_balance_tiles(summary, goals),
         *_servo_tiles(summary, stall_torque),
         *_timing_tiles(summary, period),
     ]
     return [tile for tile in found if tile is not None]
 
 
-def _way_tiles(summary: Mapping[str, Any]) -> list[Tile | None]:
-    distance, wanted = summary.get("distance_m"), float(summary["speed_ref_mps"])
-    speed = _Goal(f"commanded {number(wanted, 0, 1e3)} ± 10 %", lambda x: abs(x - wanted) <= 0.1 * wanted)
-    drift = None
-    if distance is not None:
-        drift = _Goal("goal ≤ 10 % of distance", lambda x: abs(x) <= 0.1 * abs(distance))
+def _always(_: float) -> bool:
+    return True
+
+
+def _never(_: float) -> bool:
+    return False
+
+
+def _way_tiles(summary: Mapping[str, Any], goals: Mapping[str, _Goal]) -> list[Tile | None]:
+    speed, drift = goals.get("speed_mps"), goals.get("lateral_drift_m")
+    wanted = f"commanded {number(summary['speed_ref_mps'], 0, 1e3)}"
     return [
-        _tile("Distance", distance, 2, "m", note="while measured"),
-        _tile("Speed", summary.get("speed_mps"), 1, "mm/s", speed, scale=1e3),
+        _tile("Distance", summary.get("distance_m"), 2, "m", note="while measured"),
+        _tile("Speed", summary.get("speed_mps"), 1, "mm/s", speed, scale=1e3, note=wanted),
         _tile("Sideways drift", summary.get("lateral_drift_m"), 0, "mm", drift, scale=1e3),
         _tile("Heading drift", summary.get("yaw_drift_deg"), 1, "°"),
     ]
 
 
-def _attitude_tiles(summary: Mapping[str, Any]) -> list[Tile | None]:
-    limit = attitude_goal(summary)
-    level = _Goal(f"goal ≤ {limit:g}°", lambda x: x <= limit)
+def _attitude_tiles(summary: Mapping[str, Any], goals: Mapping[str, _Goal]) -> list[Tile | None]:
     estimate = _Goal("of the estimate, goal ≤ 0.3°", lambda x: x <= 0.3)
     return [
-        _tile("Roll, RMS", summary.get("roll_rms_deg"), 2, "°", level),
-        _tile("Pitch, RMS", summary.get("pitch_rms_deg"), 2, "°", level),
+        *(
+            _tile(f"{axis.capitalize()}, {kind}", summary.get(key), 2, "°", goals.get(key))
+            for axis in ("roll", "pitch")
+            for kind, key in _attitude_figures(axis, goals)
+        ),
         _tile("Attitude error, RMS", summary.get("attitude_error_rms_deg"), 2, "°", estimate),
     ]
 
 
-def _balance_tiles(summary: Mapping[str, Any]) -> list[Tile | None]:
-    clearance = _Goal("median, goal ≥ 8 mm", lambda x: x >= 0.008)
+def _attitude_figures(axis: str, goals: Mapping[str, _Goal]) -> list[tuple[str, str]]:
+    """RMS, and the peak where a criterion is about it."""
+    figures = [("RMS", f"{axis}_rms_deg"), ("peak", f"{axis}_peak_deg")]
+    return [figure for figure in figures if figure[0] == "RMS" or figure[1] in goals]
+
+
+def _balance_tiles(summary: Mapping[str, Any], goals: Mapping[str, _Goal]) -> list[Tile | None]:
+    swing, feet = "swing_clearance_median_m", "with three feet down or more"
     return [
-        _tile("Swing clearance", summary.get("swing_clearance_median_m"), 1, "mm", clearance, scale=1e3),
-        _tile("ZMP inside support", summary.get("zmp_inside_fraction"), 0, "%", scale=100.0),
-        _tile("ZMP margin, least", summary.get("zmp_margin_min_m"), 0, "mm", scale=1e3),
+        _tile("Swing clearance", summary.get(swing), 1, "mm", goals.get(swing), scale=1e3, note="median"),
+        _tile("ZMP inside support", summary.get("zmp_inside_fraction"), 0, "%", scale=100.0, note=feet),
+        _tile("ZMP margin, least", summary.get("zmp_margin_min_m"), 0, "mm", scale=1e3, note=feet),
     ]
 
 
@@ -204,15 +231,6 @@ def _timing_tiles(summary: Mapping[str, Any], period: float) -> list[Tile | None
         _tile("Deadline misses", summary.get("deadline_misses"), 0, "", none),
         _tile("QP failures", summary.get("qp_failures"), 0, "", none),
     ]
-
-
-def attitude_goal(summary: Mapping[str, Any]) -> float:
-    """Degrees RMS that roll and pitch should stay under: by gait, and for trot by speed."""
-    if not summary.get("speed_ref_mps"):
-        return 2.5
-    if summary.get("gait") == "walk":
-        return 2.0
-    return 1.0 if summary["speed_ref_mps"] <= 0.0605 else 1.5
 
 
 def number(value: Any, digits: int, scale: float = 1.0) -> str:

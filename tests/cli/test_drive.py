@@ -31,9 +31,7 @@ class Keys:
 
 
 @pytest.fixture
-def session(monkeypatch, tmp_path):
-    monkeypatch.setattr(drive, "pace", lambda: lambda time: None)
-
+def session(tmp_path):
     def make(*looks, limit=100.0):
         screen = io.StringIO()
         keys = Keys(*looks)
@@ -81,29 +79,6 @@ def test_the_drive_ends_at_its_limit(session):
     assert source(4.98).mode is Mode.STAND
     assert source(5.0).mode is Mode.SIT
     assert source(20.0) is None
-
-
-def test_messages_push_the_status_line_down_and_see_no_terminal():
-    screen = io.StringIO()
-    above = drive.AboveStatus(screen)
-    print("careful", file=above, flush=True)
-    assert "careful\n" in screen.getvalue()
-    assert not above.isatty()
-
-
-def test_pace_keeps_to_the_wall_clock_and_does_not_hurry_after_a_pause(monkeypatch):
-    now = [50.0]
-    monkeypatch.setattr(drive.clock, "monotonic", lambda: now[0])
-    monkeypatch.setattr(drive.clock, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
-    wait = drive.pace()
-    wait(0.0)
-    wait(0.1)
-    assert now[0] == pytest.approx(50.1)
-    now[0] = 53.0
-    wait(0.12)
-    assert now[0] == pytest.approx(53.0)
-    wait(0.22)
-    assert now[0] == pytest.approx(53.1)
 
 
 class Terminal:

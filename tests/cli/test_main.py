@@ -196,6 +196,42 @@ def test_a_reader_that_goes_away_is_no_error():
     assert done.returncode == 0
 
 
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["list"]])
+def test_a_reader_of_the_help_may_go_away_too(words):
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "bluefoot_mpc.cli", *words]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.parametrize("words", [["model", "power"], ["model", "power", "--json"], ["list"]])
+def test_standard_output_may_be_closed(words):
+    line = 'exec "$0" -m bluefoot_mpc.cli "$@" >&-'
+    done = subprocess.run(["bash", "-c", line, sys.executable, *words], stderr=subprocess.PIPE, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.parametrize("words", [["list"], ["list", "--json"]])
+def test_a_full_disk_behind_standard_output_is_one_message(words):
+    with open("/dev/full", "w") as full:
+        command = [sys.executable, "-m", "bluefoot_mpc.cli", *words]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == "bluefoot: cannot write to standard output: No space left on device\n"
+
+
+def test_signs_that_the_terminal_lacks_are_replaced():
+    plain = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    script = (
+        "import sys; from bluefoot_mpc.cli import main as m; from bluefoot_mpc.cli.outcome import Outcome;"
+    )
+    script += "m._execute = lambda words, prog: Outcome(page=('0.2 N·m',)); sys.exit(m.main(['list']))"
+    done = subprocess.run([sys.executable, "-c", script], env=plain, capture_output=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"0.2 N?m\n", b"")
+
+
 def test_drive_without_a_terminal_is_wrong_use():
     done = bluefoot("drive", "--no-view", stdin=subprocess.DEVNULL)
     assert done.returncode == 2

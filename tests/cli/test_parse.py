@@ -10,6 +10,7 @@ from bluefoot_mpc.cli.parse import COMMANDS, UsageError, option_names, parse
 from bluefoot_mpc.exceptions import BlueFootError, ConfigurationError, UnknownNameError
 from bluefoot_mpc.scenarios import options as run_options
 from bluefoot_mpc.scenarios.options import RunOptions
+from bluefoot_mpc.sim.config import WORLDS
 
 EVERYTHING = shlex.split("""
     run push --robot sim --controller cpg --model m.toml --seed 7 --duration 12.5 --out there --view
@@ -96,6 +97,7 @@ def test_every_command_takes_json(words, kind):
         (["model", "check", "--states", "0"], ["--states", "0"]),
         (["drive", "--timeout", "0"], ["--timeout", "0"]),
         (["list", "--seed", "1"], ["--seed", "--json"]),
+        (["--debug", "list"], ["--debug stands before the command", "list", "drive"]),
     ],
 )
 def test_wrong_use_is_one_message_that_names_what_is_valid(words, named):
@@ -139,6 +141,7 @@ def test_the_choices_in_the_help_are_the_valid_ones(capsys):
         run_options.GAITS,
     ):
         assert "{" + ",".join(names) + "}" in text
+    assert ", ".join(WORLDS) in " ".join(text.replace("│", "").split())
 
 
 @pytest.mark.parametrize(
@@ -149,6 +152,14 @@ def test_every_command_has_help(words, capsys):
         parse([*words, "--help"])
     assert not stop.value.code
     assert "usage: bluefoot" in capsys.readouterr().out
+
+
+def test_the_help_tells_the_exit_statuses_and_the_version_is_there(capsys):
+    for words, told in (["--help"], "130 interrupted"), (["--version"], "bluefoot 0."):
+        with pytest.raises(SystemExit) as stop:
+            parse(words)
+        assert not stop.value.code
+        assert told in capsys.readouterr().out
 
 
 def test_help_of_run_names_every_option(capsys):

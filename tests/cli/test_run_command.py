@@ -149,9 +149,21 @@ def test_a_truncated_log_gives_what_is_readable(command, recorded, tmp_path):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: len(whole) * 6 // 10])
     status, data = command("replay", cut, "--rethink")
-    assert status == 0, data
+    assert status == 2, data
     assert data["truncated"]
+    assert data["rethink"]["equal"]
     assert 0 < data["frames"] < 150
+    page = tmp_path / "cut.html"
+    assert command("replay", cut, "--html", page)[0] == 2
+    assert page.is_file()
+
+
+def test_a_log_without_one_frame_is_refused(command, recorded, tmp_path):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes((recorded / "log.mcap").read_bytes()[:1500])
+    status, data = command("replay", cut)
+    assert status == 2
+    assert "nothing to replay" in data["error"]
 
 
 @pytest.mark.parametrize("content", [b"", b"not a log at all", b"\x89MCAP0\r\n"])
@@ -177,5 +189,9 @@ def test_a_missing_log_is_wrong_use(command, tmp_path):
 
 def test_the_out_folder_may_exist(command, recorded, tmp_path):
     shutil.copytree(recorded, tmp_path / "copy")
+    (tmp_path / "copy" / "report.html").write_text("of an earlier run")
+    (tmp_path / "copy" / "notes.txt").write_text("mine")
     status, _ = command("run", "stand", "--duration", "1", "--no-report", "--out", tmp_path / "copy")
     assert status in (0, 1)
+    assert not (tmp_path / "copy" / "report.html").exists()
+    assert (tmp_path / "copy" / "notes.txt").exists()

@@ -47,8 +47,8 @@ SUMMARY = {
 
 @pytest.fixture
 def page(monkeypatch, capsys):
-    def show(summary, criteria=(), folder=Path("runs/x"), width=100):
-        outcome = Outcome(page=summary_page(summary, criteria, folder))
+    def show(summary, criteria=(), folder=Path("runs/x"), width=100, events=()):
+        outcome = Outcome(page=summary_page(summary, criteria, folder, events))
         monkeypatch.setenv("COLUMNS", str(width))
         monkeypatch.setattr(entry, "_execute", lambda words, prog: outcome)
         assert entry.main(["run", "walk"]) == 0
@@ -115,6 +115,36 @@ def test_an_early_end_says_why(page):
     criteria = [Criterion(name="stays", holds=False, detail="no")]
     text = page({**SUMMARY, "stop_reason": "stopped at 3.20 s: it fell"}, criteria)
     assert "the run ended early: stopped at 3.20 s: it fell" in text
+
+
+def test_an_interrupted_run_has_not_failed(page):
+    criteria = [Criterion(name="stays", holds=False, detail="interrupted")]
+    text = page({**SUMMARY, "stop_reason": "interrupted"}, criteria)
+    assert "INTERRUPTED" in text
+    assert "FAILED" not in text
+
+
+def test_labels_stay_on_one_line_however_narrow_the_page(page):
+    assert "speed of the simulation" in page({**SUMMARY, "lateral_drift_m": -0.035}, width=80)
+
+
+def test_what_is_out_of_the_ordinary_is_told_once_a_kind(page):
+    events = [
+        (1.5, "mode stand -> walk"),
+        (3.0, "gait trot -> walk"),
+        (4.0, "trunk pose held: FL too far by 1 mm"),
+        (5.0, "trunk pose held: FL too far by 2 mm"),
+        (6.0, "mode walk -> safe trunk tilted 50 degrees"),
+    ]
+    text = page(SUMMARY, events=events)
+    assert "at 4.00 s: trunk pose held: FL too far by 1 mm (repeated: 1)" in text
+    assert "at 6.00 s: mode walk -> safe" in text
+    assert "stand -> walk" not in text
+    assert "trot -> walk" not in text
+    many = page(SUMMARY, events=[(float(n), f"thing {n}") for n in range(9)])
+    assert "thing 4" in many
+    assert "thing 5" not in many
+    assert "4 other things" in many
 
 
 @pytest.mark.parametrize("name", ["report.html", "log.mcap"])

@@ -112,7 +112,7 @@ def test_sitting_and_standing_up():
     assert command(["t", "t"]).mode is Mode.STAND
 
 
-def test_dead_man_stops_then_stands_and_any_key_goes_on():
+def test_dead_man_stops_then_stands_and_the_next_key_does_not_walk_off():
     state = pressed(["w", "w"], time=10.0)
     before = TELEOP.command(state, 10.0 + CONFIG.timeout - 0.01)
     stopped = TELEOP.command(state, 10.0 + CONFIG.timeout)
@@ -120,8 +120,11 @@ def test_dead_man_stops_then_stands_and_any_key_goes_on():
     assert before.velocity[0] > 0.0
     assert (stopped.mode, stopped.velocity[0]) == (Mode.WALK, 0.0)
     assert (standing.mode, standing.velocity[0]) == (Mode.STAND, 0.0)
-    again = TELEOP.press(state, "h", 60.0)
-    assert TELEOP.command(again, 60.0).velocity[0] > 0.0
+    back = TELEOP.press(state, "h", 60.0)
+    motion = TELEOP.command(back, 60.0)
+    assert (motion.mode, motion.velocity[0]) == (Mode.STAND, 0.0)
+    again = TELEOP.command(TELEOP.press(back, "w", 60.1), 60.1)
+    assert (again.mode, again.velocity[0]) == (Mode.WALK, CONFIG.speed_step)
 
 
 def test_dead_man_leaves_the_trunk_and_a_sitting_robot_alone():
@@ -185,6 +188,7 @@ def test_status_line_is_one_line_and_tells_when_the_dead_man_acts():
     assert "NO KEY" not in TELEOP.status(state, 0.0)
     late = TELEOP.status(state, CONFIG.timeout)
     assert "NO KEY" in late
+    assert "+10" not in late
     assert "\n" not in late
 
 

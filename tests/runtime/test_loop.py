@@ -1,4 +1,5 @@
 import os
+import re
 import signal
 from dataclasses import replace
 
@@ -152,6 +153,46 @@ def test_ctrl_c_ends_the_gait_sits_and_goes_limp(setup):
     assert data.commands[-1].joints.torque_limit.max() == 0.0
     assert robot.stopped == 1
     assert 3.0 < data.frames[-1].time < 12.0
+
+
+@pytest.mark.parametrize(
+    ("broken", "told"),
+    [
+        (lambda: 1 / 0, "scenario error: ZeroDivisionError: division by zero"),
+        (lambda: 5, "scenario error: TypeError: the command must be a MotionCommand, .* not 5"),
+    ],
+)
+def test_a_scenario_that_breaks_brings_the_robot_to_rest_and_keeps_the_log(setup, broken, told, tmp_path):
+    robot, _, pipeline = setup
+    walk = Walk()
+
+    def source(time):
+        return walk.source(time) if time < 3.0 else broken()
+
+    with Recorder(tmp_path / "log.mcap", {}, robot.period) as recorder:
+        data = run(setup, pipeline, source, recorder=recorder)
+    assert re.fullmatch(told, data.stop_reason)
+    assert data.telemetry[-1].mode is Mode.OFF
+    assert data.commands[-1].joints.torque_limit.max() == 0.0
+    assert robot.stopped == 1
+    assert 3.0 < data.frames[-1].time < 12.0
+    assert len(read_log(tmp_path / "log.mcap").frames) == len(data.frames)
+
+
+def test_a_closed_terminal_ends_the_run_like_ctrl_c_but_not_under_nohup(setup):
+    _, _, pipeline = setup
+    walk = Walk().with_duration(4.0)
+
+    def hang_up(frame, output, truth):
+        if abs(frame.time - 2.0) < 0.01:
+            os.kill(os.getpid(), signal.SIGHUP)
+
+    assert run(setup, pipeline, walk.source, observers=(hang_up,)).stop_reason == INTERRUPTED
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        assert run(setup, pipeline, walk.source, observers=(hang_up,)).stop_reason == "completed"
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_a_fall_makes_the_robot_limp_and_ends_the_run(model, resolved):

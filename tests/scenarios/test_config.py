@@ -68,6 +68,10 @@ def test_a_push_reaches_the_simulator():
         ("scenario.gait=gallop", "gallop.*trot, walk"),
         ("model.legs.hip_offset=-0.1", "hip_offset = -0.1 must be positive"),
         ("nonsense", "not of the form section.key=value"),
+        ("scenario=1", "scenario must be a table, not 1"),
+        ("model=1", "model must be a table, not 1"),
+        ("sim=1", "sim must be a table, not 1"),
+        ("scenario.duration=1e300", "duration = 1e\\+300 s must be at most 7200 s"),
     ],
 )
 def test_a_bad_override_names_value_and_choices(override, message):
@@ -87,6 +91,7 @@ def test_a_bad_override_names_value_and_choices(override, message):
         ({"randomize": "wild"}, "unknown randomization"),
         ({"friction": 0.0}, "--friction"),
         ({"seed": -1}, "--seed"),
+        ({"seed": 10**30}, "--seed = 1000.* must lie in 0.."),
         ({"push_time": -2.0}, "--push-time"),
         ({"payload": (0.1, 0.0, float("nan"), 0.0)}, "--payload"),
     ],
@@ -104,6 +109,11 @@ def test_an_option_that_the_scenario_does_not_have_is_refused():
 def test_a_push_after_the_end_is_refused():
     with pytest.raises(ConfigurationError, match="beyond the end of the run"):
         resolve(Push, RunOptions(push_time=50.0))
+
+
+def test_a_push_beyond_all_sense_is_refused():
+    with pytest.raises(ConfigurationError, match="impulse = 1e\\+09 N·s must be at most 100"):
+        resolve(Push, RunOptions(impulse=1e9))
 
 
 def test_a_missing_configuration_file_is_named(tmp_path):
@@ -142,7 +152,13 @@ def test_a_users_script_is_found_by_its_path(tmp_path):
         ("x = 1\n", "exactly one subclass of Scenario; found: none"),
         (SCRIPT + "class Other(Mine):\n    name = 'other'\n", "found: Mine, Other"),
         ("def broken(:\n", "failed to load: SyntaxError"),
-        ("import no_such_module\n", "failed to load: ModuleNotFoundError"),
+        ("import no_such_module\n", "line 1, failed to load: ModuleNotFoundError"),
+        ("\n\n1 / 0\n", "bad.py, line 3, failed to load: ZeroDivisionError: division by zero"),
+        ("open('/nowhere/at/all')\n", "failed to load: FileNotFoundError"),
+        ("import sys\nsys.exit(5)\n", "line 2, failed to load: it ends the program"),
+        (SCRIPT.replace("name =", "title ="), "Mine needs a name"),
+        (SCRIPT.replace("def command", "def comand"), "Mine lacks the method: command"),
+        (SCRIPT + "    Config = dict\n", "Mine.Config must be a subclass of ScenarioConfig"),
     ],
 )
 def test_a_script_that_is_no_scenario_is_refused(tmp_path, text, message):

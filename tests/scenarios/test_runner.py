@@ -1,3 +1,4 @@
+import errno
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,15 @@ from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.runtime.log import read_log
 from bluefoot_mpc.runtime.replay import rethink
 from bluefoot_mpc.runtime.summary import SUMMARY_KEYS, summarize
-from bluefoot_mpc.scenarios import RunOptions, Scenario, pipeline_from_log, run, run_commanded
+from bluefoot_mpc.scenarios import (
+    Presentation,
+    RunOptions,
+    Scenario,
+    pipeline_from_log,
+    run,
+    run_commanded,
+    runner,
+)
 from bluefoot_mpc.scenarios.config import resolve
 from bluefoot_mpc.scenarios.registry import SHIPPED
 from bluefoot_mpc.scenarios.runner import simulate
@@ -92,6 +101,50 @@ def test_an_unwritable_folder_is_named(tmp_path):
     blocker.write_text("")
     with pytest.raises(ConfigurationError, match="cannot write to --out"):
         run("stand", RunOptions(out=blocker / "run", duration=1.0))
+
+
+def test_two_runs_of_the_same_second_have_a_folder_each(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(runner.time, "strftime", lambda _: "now")
+    options = RunOptions(duration=0.1, report=False)
+    folders = [run("stand", options).folder for _ in range(2)]
+    assert folders == [Path("runs/now-stand"), Path("runs/now-stand-2")]
+    assert all((folder / "log.mcap").is_file() for folder in folders)
+
+
+def test_an_error_in_a_run_tells_where_the_log_lies(tmp_path, monkeypatch):
+    def fall_apart(*_):
+        raise RuntimeError("gone")
+
+    monkeypatch.setattr(runner.SimRobot, "truth", fall_apart)
+    with pytest.raises(RuntimeError, match="gone") as caught:
+        run("stand", RunOptions(duration=1.0, report=False, out=tmp_path))
+    assert caught.value.__notes__ == [f"what was recorded until then is in {tmp_path / 'log.mcap'}"]
+
+
+def test_a_report_that_cannot_be_written_is_one_message_and_the_log_stays(tmp_path, monkeypatch):
+    def half_a_page(data, summary, model, path, checks):
+        path.write_text("<html>")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(runner, "write_report", half_a_page)
+    with pytest.raises(ConfigurationError, match="cannot write .*report.html: No space left") as caught:
+        run("stand", RunOptions(duration=1.0, out=tmp_path))
+    assert "log.mcap" in caught.value.__notes__[0]
+    assert {file.name for file in tmp_path.iterdir()} == {"log.mcap", "summary.json", "config.toml"}
+
+
+def test_a_paced_run_takes_its_time_and_an_unpaced_one_does_not(tmp_path):
+    resolved = resolve(SHIPPED["stand"], RunOptions(duration=1.0))
+    options = RunOptions(report=False, out=tmp_path)
+    factors = [
+        run_commanded(
+            resolved.scenario.source, resolved, options, Presentation(paced=paced)
+        ).data.real_time_factor
+        for paced in (True, None)
+    ]
+    assert 0.5 < factors[0] < 1.1
+    assert factors[1] > 1.5
 
 
 def test_every_scenario_has_a_script_and_a_line():

@@ -79,7 +79,7 @@ def test_fall_and_its_reason_stand_on_top(run: RunData, robot: RobotModel) -> No
         fell=True, success=False, stop_reason="stopped at 2.10 s: tilt 51 deg", duration_s=3.1
     )
     text = report_html(run, summary, robot)
-    assert "The robot fell after 3.1 s" in text
+    assert "The robot fell at 2.10 s" in text
     assert "Stopped at 2.10 s: tilt 51 deg." in text
 
 

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from bluefoot_mpc.viz.verdict import attitude_goal, facts, number, tiles, verdict
+from bluefoot_mpc.viz.verdict import facts, number, tiles, verdict
 
 from .synthetic_run import make_summary
 
@@ -17,12 +17,7 @@ def test_good_walk() -> None:
 
 def test_each_missed_goal_turns_its_own_tile() -> None:
     cases = {
-        "Speed": {"speed_mps": 0.053},
-        "Sideways drift": {"lateral_drift_m": -0.36},
-        "Roll, RMS": {"roll_rms_deg": 1.01},
-        "Pitch, RMS": {"pitch_rms_deg": 1.01},
         "Attitude error, RMS": {"attitude_error_rms_deg": 0.31},
-        "Swing clearance": {"swing_clearance_median_m": 0.0079},
         "Torque, peak": {"torque_peak_nm": 1.6},
         "Hottest servo": {"servo_temp_max_c": 66.0},
         "Tick, 99 %": {"tick_us": {"p99": 20001.0}},
@@ -34,12 +29,22 @@ def test_each_missed_goal_turns_its_own_tile() -> None:
         assert bad == [label]
 
 
-def test_goals_of_the_attitude_follow_gait_and_speed() -> None:
-    goals = [
-        attitude_goal(make_summary(gait=gait, speed_ref_mps=speed))
-        for gait, speed in (("trot", 0.04), ("trot", 0.06), ("trot", 0.08), ("trot", 0.1), ("walk", 0.04))
-    ]
-    assert goals == [1.0, 1.0, 1.5, 1.5, 2.0]
+def test_the_criteria_judge_their_figures_and_nothing_else_does() -> None:
+    figures = {
+        "Speed": "speed_mps",
+        "Sideways drift": "lateral_drift_m",
+        "Roll, RMS": "roll_rms_deg",
+        "Pitch, RMS": "pitch_rms_deg",
+        "Pitch, peak": "pitch_peak_deg",
+        "Swing clearance": "swing_clearance_median_m",
+    }
+    unjudged = by_label(make_summary())
+    assert all(unjudged[label].status == "" for label in figures if label in unjudged)
+    for label, figure in figures.items():
+        for holds, status in ((True, "good"), (False, "bad")):
+            check = {"name": "n", "holds": holds, "detail": "d", "figure": figure, "goal": "≤ 7 of them"}
+            tile = {t.label: t for t in tiles(make_summary(), 1.5, 0.02, [check])}[label]
+            assert (tile.status, tile.note) == (status, "≤ 7 of them")
 
 
 def test_standing_has_no_way_tiles() -> None:
