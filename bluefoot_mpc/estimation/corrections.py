@@ -14,8 +14,14 @@ from bluefoot_mpc.estimation.filter import SIZE, VALUES, VELOCITY, FilterState, 
 from bluefoot_mpc.estimation.workspace import Workspace, compile_function
 from bluefoot_mpc.types import N_LEGS, FloatArray
 
+_FOOT_ROWS = tuple(slice(6 + 3 * leg, 9 + 3 * leg) for leg in range(N_LEGS))
+_FOOT_BLOCKS = tuple((slice(3 * leg, 3 * leg + 3),) * 2 for leg in range(N_LEGS))
 
-def correct(state: FilterState, index: IndexArray, residual: FloatArray, noise: FloatArray) -> FilterState:
+
+def correct(
+    state: FilterState, index: IndexArray, residual: FloatArray, noise: FloatArray,
+    settler: Settler | None = None,
+) -> FilterState:  # fmt: skip
     """Use direct measurements of some components of the error.
 
     Args:
@@ -23,11 +29,12 @@ def correct(state: FilterState, index: IndexArray, residual: FloatArray, noise: 
         index: (m,) components measured.
         residual: (m,) measured minus estimated.
         noise: (m, m) covariance of the measurement.
+        settler: workspace; making one takes much longer than using it.
     """
     covariance = state.covariance
     rows = covariance[index]
     change, reduced = reduce(covariance, rows, rows[:, index] + noise, residual)
-    return state if change is None else shifted(state, change, reduced)
+    return state if change is None else shifted(state, change, reduced, settler)
 
 
 def reduce(
@@ -52,7 +59,9 @@ def reduce(
     return residual @ gain, 0.5 * (reduced + reduced.T)
 
 
-def correct_scalar(state: FilterState, row: FloatArray, residual: float, variance: float) -> FilterState:
+def correct_scalar(
+    state: FilterState, row: FloatArray, residual: float, variance: float, settler: Settler | None = None
+) -> FilterState:
     """Use one measurement of a combination of errors.
 
     Args:
@@ -60,11 +69,12 @@ def correct_scalar(state: FilterState, row: FloatArray, residual: float, varianc
         row: (26,) weights of the combination.
         residual: estimated minus measured.
         variance: of the measurement.
+        settler: workspace, as for `correct`.
     """
     spread = state.covariance @ row
     scale = 1.0 / (float(row @ spread) + variance)
-    reduced = state.covariance - np.outer(scale * spread, spread)
-    return shifted(state, (-residual * scale) * spread, reduced)
+    reduced = state.covariance - (scale * spread)[:, None] * spread
+    return shifted(state, (-residual * scale) * spread, reduced, settler)
 
 
 class Settler:
@@ -99,9 +109,11 @@ class Settler:
         return self._work.outputs[0].copy()
 
 
-def shifted(state: FilterState, change: FloatArray, covariance: FloatArray) -> FilterState:
-    """The state moved by a (26,) correction, with a new covariance."""
-    settler = Settler()
+def shifted(
+    state: FilterState, change: FloatArray, covariance: FloatArray, settler: Settler | None = None
+) -> FilterState:
+    """The state moved by a (26,) correction, with a new covariance; `settler` as for `correct`."""
+    settler = settler or Settler()
     return FilterState(settler.settle(state.estimate, change, settler.no_points, []), covariance)
 
 
@@ -133,11 +145,10 @@ def plant_feet(covariance: FloatArray, legs: list[int], noise: FloatArray) -> No
         noise: (12, 12) m², covariance of all feet as measured, world axes.
     """
     for leg in legs:
-        k = 3 * leg
-        rows = slice(6 + k, 9 + k)
+        rows, block = _FOOT_ROWS[leg], _FOOT_BLOCKS[leg]
         covariance[rows] = 0.0
         covariance[:, rows] = 0.0
-        covariance[rows, rows] = noise[k : k + 3, k : k + 3]
+        covariance[rows, rows] = noise[block]
 
 
 def forget_velocity(state: FilterState, deviation: float) -> FilterState:

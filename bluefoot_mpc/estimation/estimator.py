@@ -9,6 +9,7 @@ import numpy as np
 
 from bluefoot_mpc.estimation.config import EstimatorConfig
 from bluefoot_mpc.estimation.contacts import SwitchState, advance_switches, initial_switches
+from bluefoot_mpc.estimation.corrections import Settler
 from bluefoot_mpc.estimation.filter import FilterState, initial_state
 from bluefoot_mpc.estimation.heading import HeadingReference, advance_heading
 from bluefoot_mpc.estimation.inertial import (
@@ -17,7 +18,6 @@ from bluefoot_mpc.estimation.inertial import (
     Sample,
     Strapdown,
     level_quaternion,
-    mean_rate,
     usable_samples,
 )
 from bluefoot_mpc.estimation.joints import JointFilter, JointState, initial_joints
@@ -42,11 +42,20 @@ class _Memory(NamedTuple):
     filter: FilterState
     stance: StanceState
     heading: HeadingReference
-    position: FloatArray  # (3,) m, IMU in the odometry frame
     rest: RestState
     sample: Sample | None
-    rate: FloatArray  # (3,) rad/s, base frame, bias removed
+    report: FloatArray  # (32,) what `Odometry` gave
     imu_age: float  # s since the last usable inertial sample
+
+    @property
+    def position(self) -> FloatArray:
+        """(3,) m, IMU in the odometry frame."""
+        return self.report[0:3]
+
+    @property
+    def rate(self) -> FloatArray:
+        """(3,) rad/s, base frame, bias removed."""
+        return self.report[16:19]
 
 
 class Estimator:
@@ -67,7 +76,8 @@ class Estimator:
         self._joints = JointFilter(config.joint)
         self._strapdown = Strapdown()
         self._predictor = Predictor(geometry, config)
-        self._stance = Stance(config.contact)
+        self._settler = Settler()
+        self._stance = Stance(config.contact, self._settler)
         self._odometry = Odometry(config.imu.mount)
         self._memory: _Memory | None = None
 
@@ -102,32 +112,41 @@ class Estimator:
         dt = math.nan if memory is None else frame.time - memory.time
         if memory is None or not 0.0 < dt <= self._config.max_step:
             return self._start(frame, memory)
-        config, start, end = self._config, memory.time, frame.time
+        return self._go_on(frame, memory, dt)
+
+    def _go_on(self, frame: SensorFrame, memory: _Memory, dt: float) -> BodyState:
+        """A frame that follows the previous one."""
         joints, known = self._read_joints(frame, memory.joints, dt)
-        switches = advance_switches(
-            memory.switches, frame.contact, frame.contact_valid, dt, config.contact.debounce
-        )
-        samples = usable_samples(frame.imu, start, end, memory.sample)
+        debounce = self._config.contact.debounce
+        switches = advance_switches(memory.switches, frame.contact, frame.contact_valid, dt, debounce)
+        samples = usable_samples(frame.imu, memory.time, frame.time, memory.sample)
         before = memory.filter.estimate
-        motion = self._strapdown.advance(before[:7], before[19:25], samples, (start, end))
+        motion = self._strapdown.advance(before[:7], before[19:25], samples, (memory.time, frame.time))
         angles = (memory.rest.joints, memory.joints.newest, joints.newest)
         ahead = self._predictor.advance(memory.filter, motion, angles, dt)
         standing = [closed and answers > 0.0 for closed, answers in zip(switches.closed, known, strict=True)]
         state, stance = self._stance.advance(ahead, memory.stance, standing, dt)
-        rest = advance_rest(memory.rest, ahead.moved, joints.newest, dt, config.rest)
-        if at_rest(rest, standing, samples, state, config.rest):
-            state = correct_bias(state, samples, config.rest)
-        heading = memory.heading
-        if config.heading.enabled:
-            state, heading = advance_heading(state, heading, frame.imu, dt, config.heading)
-        sample, rate, age = memory.sample, memory.rate, memory.imu_age + dt
-        if samples:
-            rate = np.array(mean_rate(samples)) - state.estimate[19:22]
-            sample, age = samples[-1], 0.0
-        fresh = _Memory(
-            end, joints, switches, state, stance, heading, memory.position, rest, sample, rate, age
+        rest = advance_rest(memory.rest, ahead.moved, joints.newest, dt, self._config.rest)
+        if at_rest(rest, standing, samples, state, self._config.rest):
+            state = correct_bias(state, samples, self._config.rest, self._settler)
+        state, heading = self._correct_heading(state, memory.heading, frame, dt)
+        report = self._odometry.advance(
+            memory.position, before, state.estimate, ahead,
+            used=stance.used, contact=switches.contact, rate=memory.rate, sums=motion.sums,
+        )  # fmt: skip
+        sample, age = (samples[-1], 0.0) if samples else (memory.sample, memory.imu_age + dt)
+        self._memory = _Memory(
+            frame.time, joints, switches, state, stance, heading, rest, sample, report, age
         )
-        return self._finish(fresh, ahead, known, before)
+        return self._state(self._memory, known)
+
+    def _correct_heading(
+        self, state: FilterState, reference: HeadingReference, frame: SensorFrame, dt: float
+    ) -> tuple[FilterState, HeadingReference]:
+        config = self._config.heading
+        if not config.enabled:
+            return state, reference
+        return advance_heading(state, reference, frame.imu, dt=dt, config=config, settler=self._settler)
 
     def _start(self, frame: SensorFrame, memory: _Memory | None) -> BodyState:
         """First frame, or the first after a jump of the clock (then with what was known)."""
@@ -143,17 +162,27 @@ class Estimator:
         carried[:7] = state.estimate[:7]
         ahead = self._predictor.advance(state, Motion(carried), (joints.newest,) * 3, 0.0)
         state = self._stance.plant(state, ahead)
-        fresh = _Memory(
-            frame.time, joints, switches, state, StanceState(),
-            HeadingReference() if memory is None else memory.heading,
-            np.zeros(3) if memory is None else memory.position, RestState(joints.newest, 0.0),
-            samples[-1] if samples else None, np.zeros(3), 0.0 if memory is None else math.inf,
-        )  # fmt: skip
+        place = np.zeros(3) if memory is None else memory.position
+        report = self._report_at_start(state, ahead, place, switches)
         if memory is None:
-            # The trunk starts above the frame's origin: take off where it would be with the IMU there.
-            report = self._report(fresh, ahead, state.estimate)
-            fresh = fresh._replace(position=np.array((0.0, 0.0, report[19])) - report[3:6])
-        return self._finish(fresh, ahead, known, state.estimate)
+            # The trunk starts above the frame's origin, and the IMU where that puts it.
+            place = np.array((0.0, 0.0, report[19])) - report[3:6]
+            report = self._report_at_start(state, ahead, place, switches)
+        self._memory = _Memory(
+            frame.time, joints, switches, state, StanceState(),
+            HeadingReference() if memory is None else memory.heading, RestState(joints.newest, 0.0),
+            samples[-1] if samples else None, report, 0.0 if memory is None else math.inf,
+        )  # fmt: skip
+        return self._state(self._memory, known)
+
+    def _report_at_start(
+        self, state: FilterState, ahead: Prediction, place: FloatArray, switches: SwitchState
+    ) -> FloatArray:
+        """Numbers of the body state without a motion, for an IMU at a place (m)."""
+        return self._odometry.advance(
+            place, state.estimate, state.estimate, ahead,
+            used=(), contact=switches.contact, rate=np.zeros(3), sums=np.zeros(10),
+        )  # fmt: skip
 
     def _read_joints(
         self, frame: SensorFrame, state: JointState, dt: float
@@ -162,18 +191,9 @@ class Estimator:
         delay = frame.time - frame.joint_time
         return self._joints.advance(state, frame.joint_position, frame.joint_valid, delay, dt)
 
-    def _report(self, memory: _Memory, ahead: Prediction, before: FloatArray) -> FloatArray:
-        return self._odometry.advance(
-            memory.position, before, memory.filter.estimate, ahead,
-            used=memory.stance.used, contact=memory.switches.contact, rate=memory.rate,
-        )  # fmt: skip
-
-    def _finish(
-        self, memory: _Memory, ahead: Prediction, known: list[float], before: FloatArray
-    ) -> BodyState:
-        """Keep the memory and make the public record from it."""
-        report = self._report(memory, ahead, before)
-        self._memory = memory._replace(position=report[0:3])
+    def _state(self, memory: _Memory, known: list[float]) -> BodyState:
+        """The public record."""
+        report = memory.report
         return BodyState(
             time=memory.time,
             position=report[3:6],

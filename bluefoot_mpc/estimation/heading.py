@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bluefoot_mpc.estimation.config import HeadingConfig
-from bluefoot_mpc.estimation.corrections import correct_scalar
+from bluefoot_mpc.estimation.corrections import Settler, correct_scalar
 from bluefoot_mpc.estimation.filter import SIZE, FilterState
 from bluefoot_mpc.estimation.inertial import rotated
 from bluefoot_mpc.types import FloatArray, ImuBatch
@@ -48,8 +48,9 @@ def newest_field(samples: FloatArray, valid: list[bool]) -> tuple[float, float, 
 
 
 def advance_heading(
-    state: FilterState, reference: HeadingReference, batch: ImuBatch, dt: float, config: HeadingConfig
-) -> tuple[FilterState, HeadingReference]:
+    state: FilterState, reference: HeadingReference, batch: ImuBatch, *, dt: float, config: HeadingConfig,
+    settler: Settler,
+) -> tuple[FilterState, HeadingReference]:  # fmt: skip
     """Take the newest magnetometer sample, for the reference first, then for the yaw.
 
     Args:
@@ -58,9 +59,11 @@ def advance_heading(
         batch: samples of this frame, base frame.
         dt: s since the previous frame.
         config: noise and gates.
+        settler: workspace for the correction.
     """
-    reference = reference._replace(wait=reference.wait - dt)
-    known = reference.samples >= config.reference_samples
+    x, y, samples, wait = reference
+    reference = HeadingReference(x, y, samples, wait - dt)
+    known = samples >= config.reference_samples
     if known and reference.wait > 0.0:
         return state, reference
     field = newest_field(batch.magnetometer, batch.valid.tolist())
@@ -72,13 +75,15 @@ def advance_heading(
         return state, HeadingReference(
             (n * reference.x + x) / (n + 1), (n * reference.y + y) / (n + 1), n + 1
         )
-    return _correct_yaw(state, reference, x, y, config), reference._replace(wait=config.interval)
+    return _correct_yaw(state, reference, (x, y), config, settler), reference._replace(wait=config.interval)
 
 
 def _correct_yaw(
-    state: FilterState, reference: HeadingReference, x: float, y: float, config: HeadingConfig
-) -> FilterState:
+    state: FilterState, reference: HeadingReference, field: tuple[float, float], config: HeadingConfig,
+    settler: Settler,
+) -> FilterState:  # fmt: skip
     """Use a horizontal field (x, y) in the world, unless its strength is not the reference's."""
+    x, y = field
     strength = math.hypot(reference.x, reference.y)
     change = abs(math.hypot(x, y) - strength)
     if strength < config.min_horizontal or change > config.gate * strength + 2.0 * config.hard_iron:
@@ -87,7 +92,7 @@ def _correct_yaw(
     residual = math.atan2(ux * y - uy * x, ux * x + uy * y)
     row, iron = heading_row(state, (ux, uy), strength)
     variance = (config.noise / strength) ** 2
-    return correct_scalar(state, row, residual - iron, variance)
+    return correct_scalar(state, row, residual - iron, variance, settler)
 
 
 def heading_row(

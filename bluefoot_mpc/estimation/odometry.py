@@ -32,7 +32,7 @@ class Odometry:
 
     def advance(
         self, position: FloatArray, before: FloatArray, after: FloatArray, ahead: Prediction, *,
-        used: Sequence[int], contact: Sequence[bool], rate: FloatArray,
+        used: Sequence[int], contact: Sequence[bool], rate: FloatArray, sums: FloatArray,
     ) -> FloatArray:  # fmt: skip
         """Move by one frame.
 
@@ -43,13 +43,14 @@ class Odometry:
             ahead: the prediction between them.
             used: feet that the filter kept in place.
             contact: (4,) feet that touch.
-            rate: (3,) rad/s, base frame.
+            rate: (3,) rad/s, base frame, bias removed, at the last frame.
+            sums: (10,) of this frame's samples, see `inertial.Motion`.
 
         Returns:
             (32,) m, rad, s: position of the IMU, of the trunk, quaternion, roll
             pitch yaw, velocity of the trunk in the base, rate, height, feet in the base.
         """
-        place, feet, now, points, roll, way, stays, touches, turning = self._work.inputs
+        place, feet, now, points, roll, way, stays, touches, turning, tally = self._work.inputs
         place[:] = position
         feet[:] = before[7:19]
         now[:] = after
@@ -61,6 +62,7 @@ class Odometry:
             stays[leg] = 1.0
         touches[:] = contact
         turning[:] = rate
+        tally[:] = sums
         self._work.call()
         return self._work.outputs[0].copy()
 
@@ -83,13 +85,15 @@ def trunk_height(feet_from_trunk: Any, contact: Any) -> Any:
 
 @functools.lru_cache(maxsize=8)
 def _report(mount: Vector) -> Any:
-    position, rate, way = (ca.SX.sym(name, 3) for name in ("position", "rate", "way"))
+    position, last, way = (ca.SX.sym(name, 3) for name in ("position", "rate", "way"))
+    sums = ca.SX.sym("sums", 10)
     before, roll = (ca.SX.sym(name, 3 * N_LEGS) for name in ("before", "roll"))
     points, after = ca.SX.sym("points", 3, N_LEGS), ca.SX.sym("after", VALUES)
     used, contact = ca.SX.sym("used", N_LEGS), ca.SX.sym("contact", N_LEGS)
     moved = ca.reshape(before + roll - after[7:19], 3, N_LEGS) @ used
     n = ca.sum1(used)
     imu = position + ca.if_else(n > 0.0, moved / ca.fmax(n, 1.0), way)
+    rate = ca.if_else(sums[0] > 0.0, sums[1:4] / ca.fmax(sums[0], 1.0) - after[19:22], last)
     rotation, lever = symbols.rotation_matrix(after[:4]), ca.DM(list(mount))
     report = ca.vertcat(
         imu, imu - rotation @ lever, after[:4], symbols.rpy(after[:4]),
@@ -98,6 +102,6 @@ def _report(mount: Vector) -> Any:
     )  # fmt: skip
     inputs = {
         "position": position, "before": before, "now": after, "points": points, "roll": roll,
-        "way": way, "used": used, "contact": contact, "rate": rate,
+        "way": way, "used": used, "contact": contact, "rate": last, "sums": sums,
     }  # fmt: skip
     return compile_function("report", inputs, {"report": report})

@@ -53,6 +53,17 @@ class Predictor:
     def __init__(self, geometry: LegGeometry, config: EstimatorConfig) -> None:
         self._work = Workspace(_prediction(geometry, config))
         self._half = np.zeros((SIZE, SIZE + 3))
+        ahead, steps, self._diagonal, scene, noise, self._moved = self._work.outputs
+        self._ahead, self._steps, self._transition, self._lever = (
+            ahead,
+            steps,
+            steps[:, :SIZE],
+            steps[:, SIZE:],
+        )
+        self._measured = (
+            scene[:12].reshape(N_LEGS, 3), scene[12:24], scene[24:36], scene[36:39], scene[39:], noise,
+        )  # fmt: skip
+        self._parts = (self._half[:, :SIZE], self._half[:, SIZE:])
 
     def advance(
         self, state: FilterState, motion: Motion, angles: tuple[FloatArray, ...], dt: float
@@ -65,24 +76,19 @@ class Predictor:
             angles: (16,) rad each: at rest, at the start, at the end.
             dt: s.
         """
-        estimate, moving, step, *joints = self._work.inputs
+        estimate, moving, step, rest, start, now = self._work.inputs
         estimate[:] = state.estimate
         moving[:] = motion.values
         step[0] = dt
-        for array, values in zip(joints, angles, strict=True):
-            array[:] = values
+        rest[:], start[:], now[:] = angles
         self._work.call()
-        ahead, steps, diagonal, scene, noise, moved = self._work.outputs
         # F P F' + L L' in one product, with F and the rate's lever L side by side.
-        half = self._half
-        np.matmul(steps[:, :SIZE], state.covariance, out=half[:, :SIZE])
-        half[:, SIZE:] = steps[:, SIZE:]
-        covariance = half @ steps.T
-        covariance.reshape(-1)[:: SIZE + 1] += diagonal
-        return Prediction(
-            FilterState(ahead, covariance), scene[:12].reshape(N_LEGS, 3), scene[12:24], scene[24:36],
-            scene[36:39], scene[39:], noise, float(moved[0]),
-        )  # fmt: skip
+        carried, lever = self._parts
+        np.matmul(self._transition, state.covariance, out=carried)
+        lever[:] = self._lever
+        covariance = np.dot(self._half, self._steps.T)
+        covariance.reshape(-1)[:: SIZE + 1] += self._diagonal
+        return Prediction(FilterState(self._ahead, covariance), *self._measured, float(self._moved[0]))
 
 
 def _prediction(geometry: LegGeometry, config: EstimatorConfig) -> Any:

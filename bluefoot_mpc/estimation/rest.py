@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bluefoot_mpc.estimation.config import RestConfig
-from bluefoot_mpc.estimation.corrections import correct
+from bluefoot_mpc.estimation.corrections import Settler, correct
 from bluefoot_mpc.estimation.filter import GYRO_BIAS, FilterState
 from bluefoot_mpc.estimation.inertial import Sample, mean_rate
 from bluefoot_mpc.types import FloatArray
@@ -62,7 +62,9 @@ def at_rest(
     return True
 
 
-def correct_bias(state: FilterState, samples: list[Sample], config: RestConfig) -> FilterState:
+def correct_bias(
+    state: FilterState, samples: list[Sample], config: RestConfig, settler: Settler
+) -> FilterState:
     """Correct the gyro bias by the frame's mean rate, which is zero at rest."""
     residual = np.array(mean_rate(samples)) - np.array(state.gyro_bias)
-    return correct(state, GYRO_BIAS, residual, config.noise**2 * np.eye(3))
+    return correct(state, GYRO_BIAS, residual, config.noise**2 * np.eye(3), settler)

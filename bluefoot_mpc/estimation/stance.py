@@ -55,12 +55,13 @@ class Stance:
 
     Args:
         config: gates.
+        settler: workspace for the corrections.
     """
 
-    def __init__(self, config: ContactConfig) -> None:
+    def __init__(self, config: ContactConfig, settler: Settler) -> None:
         self._config = config
         self._gate = Gate()
-        self._settler = Settler()
+        self._settler = settler
 
     def advance(
         self, ahead: Prediction, stance: StanceState, standing: list[bool], dt: float
@@ -122,4 +123,4 @@ class Stance:
             # Feet stand, yet none fits: it is the velocity that is wrong.
             return forget_velocity(state, deviation), 0.0
         residual = -state.estimate[4:7]
-        return correct(state, VELOCITY, residual, deviation**2 * np.eye(3)), blind
+        return correct(state, VELOCITY, residual, deviation**2 * np.eye(3), self._settler), blind
