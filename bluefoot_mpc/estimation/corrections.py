@@ -55,8 +55,10 @@ def reduce(
     _, gain, failed = dposv(spread, rows)
     if failed:
         return None, covariance
-    reduced = covariance - rows.T @ gain
-    return residual @ gain, 0.5 * (reduced + reduced.T)
+    reduced = covariance - np.dot(rows.T, gain)
+    reduced = reduced + reduced.T
+    reduced *= 0.5
+    return np.dot(residual, gain), reduced
 
 
 def correct_scalar(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bluefoot_mpc.estimation.config import ContactConfig
 from bluefoot_mpc.estimation.corrections import (
@@ -15,18 +17,38 @@ from bluefoot_mpc.estimation.corrections import (
     plant_feet,
     reduce,
 )
-from bluefoot_mpc.estimation.filter import VELOCITY, FilterState
+from bluefoot_mpc.estimation.filter import VELOCITY, FilterState, IndexArray
 from bluefoot_mpc.estimation.prediction import Prediction
 from bluefoot_mpc.types import N_LEGS, FloatArray
 
 _FEET = slice(6, 18)
-# Rows of the measurement for every subset of legs, by its bits.
-_ROWS = tuple(
-    np.array([3 * leg + axis for leg in range(N_LEGS) if mask >> leg & 1 for axis in range(3)], dtype=np.intp)
-    for mask in range(1 << N_LEGS)
-)
-_BLOCKS = tuple(rows[:, None] for rows in _ROWS)
-_ERRORS = tuple(6 + rows for rows in _ROWS)
+
+
+class _Subset(NamedTuple):
+    """Indices that belong to some of the legs.
+
+    Attributes:
+        others: the legs that are left.
+        rows: rows of the measurement.
+        errors: the same among the filter's errors.
+        block: the same in the flat covariance of the measurement.
+    """
+
+    others: list[int]
+    rows: IndexArray
+    errors: IndexArray
+    block: NDArray[np.intp]
+
+
+def _subset(legs: tuple[int, ...]) -> _Subset:
+    rows = np.array([3 * leg + axis for leg in legs for axis in range(3)], dtype=np.intp)
+    others = [leg for leg in range(N_LEGS) if leg not in legs]
+    return _Subset(others, rows, 6 + rows, 3 * N_LEGS * rows[:, None] + rows)
+
+
+_SUBSETS = {
+    legs: _subset(legs) for n in range(N_LEGS + 1) for legs in itertools.combinations(range(N_LEGS), n)
+}
 
 
 class StanceState(NamedTuple):
@@ -105,14 +127,13 @@ class Stance:
 
     def _use(self, ahead: Prediction, used: tuple[int, ...], spread: FloatArray) -> FilterState:
         before = ahead.filter
-        if len(used) == N_LEGS:
-            others, rows, residual = [], before.covariance[_FEET], ahead.residual
-        else:
-            others = [leg for leg in range(N_LEGS) if leg not in used]
-            mask = sum([1 << leg for leg in used])
-            rows, residual = before.covariance[_ERRORS[mask]], ahead.residual[_ROWS[mask]]
-            spread = spread[_BLOCKS[mask], _ROWS[mask]]
-        change, covariance = reduce(before.covariance, rows, spread, residual)
+        others, rows, errors, block = _SUBSETS[used]
+        change, covariance = reduce(
+            before.covariance,
+            before.covariance.take(errors, axis=0),
+            spread.take(block),
+            ahead.residual.take(rows),
+        )
         plant_feet(covariance, others, ahead.noise)
         moved = 0.0 if change is None else change
         return FilterState(self._settler.settle(before.estimate, moved, ahead.from_imu, others), covariance)
