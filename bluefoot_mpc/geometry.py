@@ -16,19 +16,21 @@ from bluefoot_mpc.types import FloatArray
 
 
 def wrap_angle(angle: float) -> float:
-    """The same angle in (-pi, pi]."""
+    """The same angle in (-pi, pi]; nearly always it is there already, and then stays as it is."""
+    if -math.pi < angle <= math.pi:
+        return angle
     return math.pi - (math.pi - angle) % (2.0 * math.pi)
 
 
+def wrap_angles(angles: FloatArray) -> FloatArray:
+    """(...) the same angles in (-pi, pi]."""
+    return np.asarray(np.pi - (np.pi - angles) % (2.0 * np.pi))
+
+
 def skew(vector: FloatArray) -> FloatArray:
-    """(3, 3) matrix S with ``S @ x == cross(vector, x)``."""
+    """(3, 3) matrix S with ``S @ x`` the cross product of `vector` and x."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross product of two 3-vectors, several times faster than ``np.cross``."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def rotation_z(angle: float) -> FloatArray:
@@ -87,28 +89,6 @@ def quaternion_from_rpy(rpy: FloatArray) -> FloatArray:
 def rpy_from_quaternion(quaternion: FloatArray) -> FloatArray:
     """(3,) roll, pitch, yaw (rad) of a unit quaternion ``x, y, z, w``."""
     return rpy_from_rotation(rotation_from_quaternion(quaternion))
-
-
-def quaternion_product(a: FloatArray, b: FloatArray) -> FloatArray:
-    """(4,) Hamilton product; rotates by `b` first, then by `a`."""
-    ax, ay, az, aw = (float(c) for c in a)
-    bx, by, bz, bw = (float(c) for c in b)
-    return np.array(
-        [
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        ]
-    )
-
-
-def quaternion_from_rotation_vector(vector: FloatArray) -> FloatArray:
-    """(4,) quaternion of the rotation by ``|vector|`` rad about `vector`."""
-    angle = math.sqrt(float(vector @ vector))
-    # sin(a/2)/a near zero by its series, so that tiny steps keep their accuracy.
-    half_sinc = 0.5 - angle * angle / 48.0 if angle < 1e-4 else math.sin(0.5 * angle) / angle
-    return np.array([*(half_sinc * vector), math.cos(0.5 * angle)])
 
 
 def convex_hull(points: FloatArray) -> FloatArray:

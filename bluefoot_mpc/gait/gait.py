@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.gait.calibration import LimitCycle
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.engine import GaitEngine
 from bluefoot_mpc.gait.footholds import Stride, early_contact, freeze, virtual_foothold
@@ -45,14 +44,6 @@ class Gait:
     def reset(self) -> None:
         """Stand at the origin with every foot at its nominal place."""
         self.state = self._engine.rest(self._nominal)
-
-    def limit_cycle(self, gait: str) -> LimitCycle:
-        """The measured limit cycle of a named gait.
-
-        Raises:
-            UnknownNameError: there is no such gait.
-        """
-        return self._engine.transition.cycle(place_of(gait))
 
     def step(self, inputs: GaitInputs, dt: float) -> GaitOutput:
         """Advance by one tick.

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, cos, degrees, hypot, isfinite, pi, sin, sqrt
+from math import atan2, cos, degrees, hypot, isfinite, sin, sqrt
 
 import numpy as np
 
 from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.geometry import wrap_angle, wrap_angles
 from bluefoot_mpc.model.legs.geometry import ALL_LEGS, HipConstants, LegGeometry
 from bluefoot_mpc.types import JOINTS, LEG_JOINTS, LEGS, BoolArray, FloatArray
 
@@ -169,9 +170,9 @@ def inverse_in_leg(
     c3 = np.clip((near * near - a2 * a2 - a3 * a3) / (2.0 * a2 * a3), -1.0, 1.0)
     s3 = np.sqrt(1.0 - c3 * c3) * (-1.0 if knee_up else 1.0)
     q3 = np.arctan2(s3, c3)
-    q2 = _wrapped(np.arctan2(height, reach) - np.arctan2(a3 * s3, a2 + a3 * c3))
+    q2 = wrap_angles(np.arctan2(height, reach) - np.arctan2(a3 * s3, a2 + a3 * c3))
     q1 = np.broadcast_to(np.arctan2(y, x), q2.shape)
-    return np.stack([q1, q2, q3, _wrapped(ankle - q2 - q3)], axis=-1), np.abs(distance - near)
+    return np.stack([q1, q2, q3, wrap_angles(ankle - q2 - q3)], axis=-1), np.abs(distance - near)
 
 
 def _leg_angles(
@@ -190,8 +191,8 @@ def _leg_angles(
     c3 = min(1.0, max(-1.0, (near * near - a2 * a2 - a3 * a3) / (2.0 * a2 * a3)))
     s3 = -sqrt(1.0 - c3 * c3) if knee_up else sqrt(1.0 - c3 * c3)
     q3 = atan2(s3, c3)
-    q2 = _wrap(atan2(height, reach) - atan2(a3 * s3, a2 + a3 * c3))
-    return (atan2(y, x), q2, q3, _wrap(direction - q2 - q3)), abs(distance - near)
+    q2 = wrap_angle(atan2(height, reach) - atan2(a3 * s3, a2 + a3 * c3))
+    return (atan2(y, x), q2, q3, wrap_angle(direction - q2 - q3)), abs(distance - near)
 
 
 def _limit_violations(geometry: LegGeometry, leg: int, angles: Sequence[float]) -> list[LimitViolation]:
@@ -203,14 +204,3 @@ def _limit_violations(geometry: LegGeometry, leg: int, angles: Sequence[float]) 
         if excess > LIMIT_TOLERANCE:
             found.append(LimitViolation(leg=LEGS[leg], joint=joint, angle=angle, limit=limit, excess=excess))
     return found
-
-
-def _wrap(angle: float) -> float:
-    """The angle in (-pi, pi]; nearly always it is there already."""
-    if -pi < angle <= pi:
-        return angle
-    return pi - (pi - angle) % (2.0 * pi)
-
-
-def _wrapped(angle: FloatArray) -> FloatArray:
-    return np.asarray(np.pi - (np.pi - angle) % (2.0 * np.pi))

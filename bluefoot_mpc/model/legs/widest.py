@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bluefoot_mpc.geometry import wrap_angles
 from bluefoot_mpc.model.legs.geometry import ALL_LEGS, LegGeometry
 from bluefoot_mpc.model.legs.inverse import REACH_TOLERANCE, inverse_in_leg
 from bluefoot_mpc.types import FloatArray
@@ -81,7 +82,7 @@ def search(
             narrowing *= 2.0 / (SCAN_POINTS - 1)
             places = np.take_along_axis(places, best, axis=-1) + narrowing * _OFFSETS
     turn = np.take_along_axis(turns, best, axis=-1)[..., 0]
-    return np.asarray(np.pi - (np.pi - bearing - turn) % (2.0 * np.pi))
+    return wrap_angles(bearing + turn)
 
 
 def widest_margin(
