@@ -54,8 +54,9 @@ def main() -> int:
     console = Console()
     console.print(table)
     console.print(
-        "Expected of the paper's networks: a trot lifts FL+RR and FR+RL half a cycle apart; a walk puts"
-        " its feet down FR, RL, FL, RR; the trunk sways away from the leg in flight, and not at all in a trot."
+        "Expected of the paper's networks: a trot lifts FL+RR and FR+RL half a cycle apart;"
+        " a walk puts its feet down FR, RL, FL, RR; the trunk sways away from the leg in flight,"
+        " and not at all in a trot."
     )
     for file in files:
         console.print(f"wrote {file}")

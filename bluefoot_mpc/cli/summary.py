@@ -199,7 +199,7 @@ def _figure_row(name: str, value: Any) -> Row:
 def _figure(value: Any) -> str:
     writers: dict[type, Callable[[Any], str]] = {
         bool: lambda v: "yes" if v else "no",
-        float: lambda v: f"{v:.4g}",
+        float: lambda v: f"{round(v, 6):.4g}",
     }
     if value is None:
         return _NONE

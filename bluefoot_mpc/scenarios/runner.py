@@ -199,7 +199,7 @@ def _log_in(folder: Path) -> Iterator[None]:
         yield
     except BaseException as error:
         if (folder / LOG).is_file():
-            error.add_note(f"what was recorded until then is in {folder / LOG}")
+            error.add_note(f"the log, as far as it goes, is in {folder / LOG}")
         raise
 
 

@@ -119,7 +119,7 @@ def test_an_error_in_a_run_tells_where_the_log_lies(tmp_path, monkeypatch):
     monkeypatch.setattr(runner.SimRobot, "truth", fall_apart)
     with pytest.raises(RuntimeError, match="gone") as caught:
         run("stand", RunOptions(duration=1.0, report=False, out=tmp_path))
-    assert caught.value.__notes__ == [f"what was recorded until then is in {tmp_path / 'log.mcap'}"]
+    assert caught.value.__notes__ == [f"the log, as far as it goes, is in {tmp_path / 'log.mcap'}"]
 
 
 def test_a_report_that_cannot_be_written_is_one_message_and_the_log_stays(tmp_path, monkeypatch):
