@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from typing import Any
 
 import casadi as ca
@@ -33,32 +34,16 @@ def correct(
     """
     covariance = state.covariance
     rows = covariance[index]
-    change, reduced = reduce(covariance, rows, rows[:, index] + noise, residual)
-    return state if change is None else shifted(state, change, reduced, settler)
+    _, gain, failed = dposv(rows[:, index] + noise, rows)
+    if failed:  # rounding has made the covariance indefinite: leave this measurement out
+        return state
+    return shifted(state, residual @ gain, _symmetric(covariance - rows.T @ gain), settler)
 
 
-def reduce(
-    covariance: FloatArray, rows: FloatArray, spread: FloatArray, residual: FloatArray
-) -> tuple[FloatArray | None, FloatArray]:
-    """What measurements of some components leave to be known.
-
-    Args:
-        covariance: (26, 26) before.
-        rows: (m, 26) of it, of the components measured.
-        spread: (m, m) covariance of the residual.
-        residual: (m,) measured minus estimated.
-
-    Returns:
-        (26,) correction, or None where rounding has made the covariance
-        indefinite and the measurement must be left out, and (26, 26) covariance after.
-    """
-    _, gain, failed = dposv(spread, rows)
-    if failed:
-        return None, covariance
-    reduced = covariance - np.dot(rows.T, gain)
-    reduced = reduced + reduced.T
-    reduced *= 0.5
-    return np.dot(residual, gain), reduced
+def _symmetric(matrix: FloatArray) -> FloatArray:
+    both = matrix + matrix.T
+    both *= 0.5
+    return both
 
 
 def correct_scalar(
@@ -205,3 +190,74 @@ class Gate:
         self._work.call()
         values: list[float] = self._work.outputs[0].tolist()
         return values
+
+
+class FeetCorrection:
+    """Workspace that corrects by some of the feet; holds no memory.
+
+    The same as `correct` with a block of the measurement for each foot, and
+    faster: always twelve rows, zero for the feet that are left out, and no
+    library call that is only warm when it is called often.
+    """
+
+    def __init__(self) -> None:
+        self._work = Workspace(_whitening())
+
+    def reduce(
+        self, covariance: FloatArray, spread: FloatArray, residual: FloatArray, used: tuple[int, ...]
+    ) -> tuple[FloatArray | None, FloatArray]:
+        """What the feet leave to be known.
+
+        Args:
+            covariance: (26, 26) before.
+            spread: (12, 12) m², covariance of the residual.
+            residual: (12,) m, measured minus estimated.
+            used: the feet that are used.
+
+        Returns:
+            (26,) correction, or None where rounding has made the covariance
+            indefinite and the feet must be left out, and (26, 26) covariance after.
+        """
+        block, difference, weights = self._work.inputs
+        block[:] = spread
+        difference[:] = residual
+        weights[:] = _WEIGHTS[used]
+        self._work.call()
+        whitener, white, pivot = self._work.outputs
+        if not pivot[0] > 0.0:
+            return None, covariance
+        rows = np.dot(whitener, covariance[_FEET])
+        return np.dot(white, rows), _symmetric(covariance - np.dot(rows.T, rows))
+
+
+_FEET = slice(6, 18)
+_WEIGHTS = {
+    legs: tuple(1.0 if leg in legs else 0.0 for leg in range(N_LEGS))
+    for n in range(N_LEGS + 1)
+    for legs in itertools.combinations(range(N_LEGS), n)
+}
+
+
+@functools.lru_cache(maxsize=1)
+def _whitening() -> Any:
+    """Inverse Cholesky factor of the used feet's block, and the residual times it (may be shared)."""
+    n = 3 * N_LEGS
+    spread, residual, used = ca.SX.sym("spread", n, n), ca.SX.sym("residual", n), ca.SX.sym("used", N_LEGS)
+    weights = ca.vec(ca.repmat(used, 1, 3).T)
+    # A foot that is left out becomes an uncorrelated row of variance 1.
+    masked = spread * (weights @ weights.T) + ca.diag(1.0 - weights)
+    factor, inverse, pivots = ca.SX(n, n), ca.SX(n, n), []
+    for j in range(n):
+        pivots.append(masked[j, j] - ca.sumsqr(factor[j, :j]))
+        factor[j, j] = ca.sqrt(pivots[j])
+        for i in range(j + 1, n):
+            factor[i, j] = (masked[i, j] - ca.dot(factor[i, :j], factor[j, :j])) / factor[j, j]
+    for j in range(n):
+        inverse[j, j] = 1.0 / factor[j, j]
+        for i in range(j + 1, n):
+            inverse[i, j] = -ca.dot(factor[i, j:i].T, inverse[j:i, j]) / factor[i, i]
+    whitener = ca.diag(weights) @ inverse
+    return compile_function(
+        "whitening", {"spread": spread, "residual": residual, "used": used},
+        {"whitener": whitener.T, "white": whitener @ residual, "pivot": ca.mmin(ca.vertcat(*pivots))},
+    )  # fmt: skip

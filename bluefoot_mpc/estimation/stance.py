@@ -6,48 +6,27 @@ import itertools
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bluefoot_mpc.estimation.config import ContactConfig
 from bluefoot_mpc.estimation.corrections import (
+    FeetCorrection,
     Gate,
     Settler,
     correct,
     forget_velocity,
     plant_feet,
-    reduce,
 )
-from bluefoot_mpc.estimation.filter import VELOCITY, FilterState, IndexArray
+from bluefoot_mpc.estimation.filter import VELOCITY, FilterState
 from bluefoot_mpc.estimation.prediction import Prediction
 from bluefoot_mpc.types import N_LEGS, FloatArray
 
 _FEET = slice(6, 18)
 
 
-class _Subset(NamedTuple):
-    """Indices that belong to some of the legs.
-
-    Attributes:
-        others: the legs that are left.
-        rows: rows of the measurement.
-        errors: the same among the filter's errors.
-        block: the same in the flat covariance of the measurement.
-    """
-
-    others: list[int]
-    rows: IndexArray
-    errors: IndexArray
-    block: NDArray[np.intp]
-
-
-def _subset(legs: tuple[int, ...]) -> _Subset:
-    rows = np.array([3 * leg + axis for leg in legs for axis in range(3)], dtype=np.intp)
-    others = [leg for leg in range(N_LEGS) if leg not in legs]
-    return _Subset(others, rows, 6 + rows, 3 * N_LEGS * rows[:, None] + rows)
-
-
-_SUBSETS = {
-    legs: _subset(legs) for n in range(N_LEGS + 1) for legs in itertools.combinations(range(N_LEGS), n)
+_OTHERS = {
+    legs: [leg for leg in range(N_LEGS) if leg not in legs]
+    for n in range(N_LEGS + 1)
+    for legs in itertools.combinations(range(N_LEGS), n)
 }
 
 
@@ -83,6 +62,7 @@ class Stance:
     def __init__(self, config: ContactConfig, settler: Settler) -> None:
         self._config = config
         self._gate = Gate()
+        self._feet = FeetCorrection()
         self._settler = settler
 
     def advance(
@@ -127,13 +107,8 @@ class Stance:
 
     def _use(self, ahead: Prediction, used: tuple[int, ...], spread: FloatArray) -> FilterState:
         before = ahead.filter
-        others, rows, errors, block = _SUBSETS[used]
-        change, covariance = reduce(
-            before.covariance,
-            before.covariance.take(errors, axis=0),
-            spread.take(block),
-            ahead.residual.take(rows),
-        )
+        others = _OTHERS[used]
+        change, covariance = self._feet.reduce(before.covariance, spread, ahead.residual, used)
         plant_feet(covariance, others, ahead.noise)
         moved = 0.0 if change is None else change
         return FilterState(self._settler.settle(before.estimate, moved, ahead.from_imu, others), covariance)
