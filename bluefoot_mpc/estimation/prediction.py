@@ -52,18 +52,14 @@ class Predictor:
 
     def __init__(self, geometry: LegGeometry, config: EstimatorConfig) -> None:
         self._work = Workspace(_prediction(geometry, config))
-        self._half = np.zeros((SIZE, SIZE + 3))
+        self._half = np.zeros((SIZE + 3, SIZE))
         ahead, steps, self._diagonal, scene, noise, self._moved = self._work.outputs
-        self._ahead, self._steps, self._transition, self._lever = (
-            ahead,
-            steps,
-            steps[:, :SIZE],
-            steps[:, SIZE:],
-        )
+        self._ahead, self._steps = ahead, steps.T
+        self._transition, self._lever = steps[:SIZE], steps[SIZE:]
         self._measured = (
             scene[:12].reshape(N_LEGS, 3), scene[12:24], scene[24:36], scene[36:39], scene[39:], noise,
         )  # fmt: skip
-        self._parts = (self._half[:, :SIZE], self._half[:, SIZE:])
+        self._parts = (self._half[:SIZE], self._half[SIZE:])
 
     def advance(
         self, state: FilterState, motion: Motion, angles: tuple[FloatArray, ...], dt: float
@@ -82,11 +78,11 @@ class Predictor:
         step[0] = dt
         rest[:], start[:], now[:] = angles
         self._work.call()
-        # F P F' + L L' in one product, with F and the rate's lever L side by side.
+        # F P F' + L L' in one product: (F L) times P F' over L', with the rate's lever L.
         carried, lever = self._parts
-        np.matmul(self._transition, state.covariance, out=carried)
+        np.dot(state.covariance, self._transition, carried)
         lever[:] = self._lever
-        covariance = np.dot(self._half, self._steps.T)
+        covariance = np.dot(self._steps, self._half)
         covariance.reshape(-1)[:: SIZE + 1] += self._diagonal
         return Prediction(FilterState(self._ahead, covariance), *self._measured, float(self._moved[0]))
 
@@ -109,7 +105,7 @@ def _prediction(geometry: LegGeometry, config: EstimatorConfig) -> Any:
         {"before": before, "carried": carried, "dt": dt, "rest": rest, "start": start, "now": now},
         {
             "after": ca.vertcat(quaternion, velocity_after, feet_after, before[19:]),
-            "step": ca.horzcat(step, lever).T,
+            "step": ca.horzcat(step, lever),
             "diagonal": _growth(config, dt, force),
             "scene": ca.vertcat(points, from_imu, roll, way, seen - feet_after),
             "noise": noise,

@@ -4,6 +4,7 @@ import pytest
 
 from bluefoot_mpc.estimation.config import EstimatorConfig
 from bluefoot_mpc.estimation.corrections import (
+    FeetCorrection,
     Gate,
     Settler,
     correct,
@@ -193,6 +194,33 @@ def test_scalar_correction_equals_the_block_one():
     other = correct(state, np.array([3]), np.array([0.02]), np.array([[1e-4]]))
     np.testing.assert_allclose(one.covariance, other.covariance, atol=1e-15)
     np.testing.assert_allclose(one.velocity, other.velocity, atol=1e-15)
+
+
+@pytest.mark.parametrize("used", [(0,), (1, 2), (0, 1, 3), (0, 1, 2, 3)])
+def test_correcting_by_feet_equals_the_general_correction(used):
+    state = random_state(10)
+    rng = np.random.default_rng(10)
+    root = rng.normal(size=(4, 3, 3)) * 0.003
+    noise = np.zeros((12, 12))
+    for leg in range(4):
+        part = slice(3 * leg, 3 * leg + 3)
+        noise[part, part] = root[leg] @ root[leg].T + 1e-8 * np.eye(3)
+    residual = rng.normal(size=12) * 0.01
+    spread = state.covariance[6:18, 6:18] + noise
+    change, covariance = FeetCorrection().reduce(state.covariance, spread, residual, used)
+    rows = np.array([3 * leg + axis for leg in used for axis in range(3)])
+    expected = correct(state, FEET[rows], residual[rows], noise[np.ix_(rows, rows)])
+    np.testing.assert_allclose(covariance, expected.covariance, atol=1e-14)
+    np.testing.assert_array_equal(covariance, covariance.T)
+    after = shifted(state, change, covariance)
+    np.testing.assert_allclose(after.estimate, expected.estimate, atol=1e-13)
+
+
+def test_feet_are_left_out_of_an_indefinite_covariance():
+    covariance = -np.eye(SIZE)
+    change, kept = FeetCorrection().reduce(covariance, covariance[6:18, 6:18], np.ones(12), (0, 3))
+    assert change is None
+    assert kept is covariance
 
 
 def test_an_indefinite_covariance_leaves_the_measurement_out():
