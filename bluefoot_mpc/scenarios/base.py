@@ -118,7 +118,8 @@ def not_fallen(summary: Mapping[str, Any]) -> Criterion:
     """The robot did not fall, and nothing stopped it before the end."""
     reason = str(summary["stop_reason"])
     if summary["fell"]:
-        return Criterion(name="stays on its feet", holds=False, detail=f"it fell ({reason})")
+        how = "the trunk or a link above a foot touched the ground" if reason == "completed" else reason
+        return Criterion(name="stays on its feet", holds=False, detail=f"it fell ({how})")
     holds = reason == "completed"
     return Criterion(name="stays on its feet to the end", holds=holds, detail="yes" if holds else reason)
 

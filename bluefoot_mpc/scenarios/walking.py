@@ -191,6 +191,10 @@ class Transition(Scenario):
         """All of the walking, both changes of gait included."""
         return self.config.stand_time + 2.0, self.config.duration
 
+    def criteria(self, summary: Mapping[str, Any]) -> list[Criterion]:
+        """On its feet, level, and as fast as commanded, the changes of gait included."""
+        return [not_fallen(summary), *speed_criteria(summary), *level_criteria(summary)]
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class PushScenarioConfig(WalkConfig):

@@ -6,7 +6,7 @@ from bluefoot_mpc.scenarios.base import NOT_MEASURED
 from bluefoot_mpc.scenarios.config import resolve
 from bluefoot_mpc.scenarios.options import RunOptions
 from bluefoot_mpc.scenarios.posing import POSITION_ERROR, Pose, Stand
-from bluefoot_mpc.scenarios.walking import Turn, Walk
+from bluefoot_mpc.scenarios.walking import Transition, Turn, Walk
 
 GOOD = {
     "fell": False,
@@ -64,6 +64,7 @@ def test_the_tilt_allowed_follows_gait_speed_and_ground(options, limit, axis):
     ("change", "name"),
     [
         ({"fell": True, "stop_reason": "stopped at 6.2 s: tilted"}, "stays on its feet"),
+        ({"fell": True}, "stays on its feet"),
         ({"stop_reason": "interrupted"}, "stays on its feet to the end"),
         ({"speed_mps": 0.0539}, "mean speed within 10 % of the command"),
         ({"speed_mps": 0.0661}, "mean speed within 10 % of the command"),
@@ -83,7 +84,7 @@ def test_clearance_is_asked_of_walking_on_flat_floor_only():
 
 def test_what_a_short_run_does_not_measure_does_not_hold_and_says_why():
     nothing = dict.fromkeys(GOOD) | {"fell": False, "stop_reason": "completed", "speed_ref_mps": 0.06}
-    for scenario in (walk(), Stand(), Pose(), Turn()):
+    for scenario in (walk(), Stand(), Pose(), Turn(), Transition()):
         first, *others = scenario.criteria(nothing)
         assert first.holds
         assert others
