@@ -227,7 +227,8 @@ class FeetCorrection:
         if not pivot[0] > 0.0:
             return None, covariance
         rows = np.dot(whitener, covariance[_FEET])
-        return np.dot(white, rows), _symmetric(covariance - np.dot(rows.T, rows))
+        # With two arrays numpy takes the product that the prediction has just used, not a slower one.
+        return np.dot(white, rows), _symmetric(covariance + np.dot(rows.T, -rows))
 
 
 _FEET = slice(6, 18)
