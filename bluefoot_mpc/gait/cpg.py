@@ -12,7 +12,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi
 import numpy as np
@@ -38,8 +38,7 @@ class CpgConfig:
         require_range(1e-4, 0.5, max_step=self.max_step)
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class CpgState:
+class CpgState(NamedTuple):
     """State of the four oscillators, house leg order.
 
     Attributes:
@@ -51,8 +50,7 @@ class CpgState:
     y2: Four
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class CpgInputs:
+class CpgInputs(NamedTuple):
     """What drives the network during one step.
 
     Attributes:
@@ -81,6 +79,7 @@ class CpgIntegrator:
         self._max_step = config.max_step
         self._state = np.zeros(8)
         self._matrix = np.zeros(16)
+        self._coupling: tuple[float, ...] = ()
         self._parameters = np.ones(11)
         self._function = _two_steps(config.convergence, config.steepness, config.gamma)
         self._buffer, self._call = self._function.buffer()
@@ -93,7 +92,8 @@ class CpgIntegrator:
         """State after `dt` seconds; see `advance`."""
         pairs = max(1, math.ceil(0.5 * abs(inputs.omega) * dt / self._max_step - 1e-9))
         self._state[:] = (*state.y1, *state.y2)
-        self._matrix[:] = inputs.matrix
+        if inputs.matrix is not self._coupling:
+            self._matrix[:] = self._coupling = inputs.matrix
         self._parameters[:] = (
             0.5 * dt / pairs,
             inputs.omega,

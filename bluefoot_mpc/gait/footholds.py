@@ -10,7 +10,7 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from bluefoot_mpc.gait.swing import lift_profile, matched_step, smooth_step, spring_transition
 from bluefoot_mpc.gait.virtual_robot import VirtualPose, carried, point_velocity
@@ -98,8 +98,7 @@ class Foot:
         return self.local if self.swinging else pose.to_local(self.anchor)
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Stride:
+class Stride(NamedTuple):
     """What all feet share during one step.
 
     Attributes:
@@ -127,8 +126,7 @@ class Stride:
     shift: complex
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class LegClock:
+class LegClock(NamedTuple):
     """One leg's place in the cycle after the step.
 
     Attributes:
@@ -250,8 +248,9 @@ def _goal(foot: Foot, pose: VirtualPose, stride: Stride, config: FootholdConfig)
 
 def _pull(foot: Foot, stride: Stride, config: FootholdConfig) -> None:
     """Damped point mass, integrated exactly in the error to the foothold."""
-    before = _goal(foot, stride.before, stride, config)
     after = _goal(foot, stride.after, stride, config)
+    # Only a foothold that is fixed in the world moves in b'.
+    before = after if foot.goal is None else stride.before.to_local(foot.goal)
     drift = (after - before) / stride.dt
     rate = config.swing_rate / stride.swing_time
     a, b, c, d = spring_transition(rate, config.damping_ratio, stride.dt)

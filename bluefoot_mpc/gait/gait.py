@@ -189,31 +189,38 @@ class Gait:
         return self.state.pose.to_local(goal), foot.offset_z
 
     def _output(self, state: GaitState) -> GaitOutput:
-        rhythm, cpg = state.rhythm, state.cpg
-        phase, progress, rows = [], [], []
+        rhythm, (y1, y2), pose, share = state.rhythm, state.cpg, state.pose, state.rhythm.share
+        phase: list[float] = []
+        progress: list[float] = []
+        rows: list[float] = []
+        heights: list[float] = []
         for leg, foot in enumerate(state.feet):
-            swing, part = rhythm.progress(cpg.y1[leg], cpg.y2[leg])
-            phase.append(rhythm.share * part if swing else rhythm.share + (1.0 - rhythm.share) * part)
+            swing, part = rhythm.progress(y1[leg], y2[leg])
+            phase.append((share * part if swing else share + (1.0 - share) * part) % 1.0)
             progress.append(part if swing else 0.0)
-            place = foot.in_b(state.pose)
-            rows.append((place.real, place.imag, foot.z))
-        feet = np.array(rows)
+            place = foot.in_b(pose)
+            rows += (place.real, place.imag, foot.z)
+            heights.append(foot.z)
+        centre, velocity = pose.centre, state.velocity
+        numbers: list[float] = [*y1, *y2, *phase, *rows, *heights, *progress]
+        numbers += (centre.real, centre.imag, pose.yaw, velocity.real, velocity.imag)
+        values = np.array(numbers)  # one for all: making a small array costs more than a view
         return GaitOutput(
             phase=GaitPhase(
                 swing=np.array([foot.swinging for foot in state.feet]),
-                y1=np.array(cpg.y1),
-                y2=np.array(cpg.y2),
-                phase=np.array(phase) % 1.0,
+                y1=values[0:4],
+                y2=values[4:8],
+                phase=values[8:12],
                 walking=state.walking,
             ),
-            foot_position=feet,
-            foot_height=feet[:, 2].copy(),
-            swing_progress=np.array(progress),
-            virtual_pose=np.array([state.pose.centre.real, state.pose.centre.imag, state.pose.yaw]),
-            velocity=np.array([state.velocity.real, state.velocity.imag]),
+            foot_position=values[12:24].reshape(4, 3),
+            foot_height=values[24:28],
+            swing_progress=values[28:32],
+            virtual_pose=values[32:35],
+            velocity=values[35:37],
             yaw_rate=state.yaw_rate,
             cycle_time=state.cycle,
-            swing_share=rhythm.share,
+            swing_share=share,
         )
 
 

@@ -6,8 +6,6 @@ way to rest standing legs stay down while the others finish their swing.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from bluefoot_mpc.gait.cpg import CpgInputs, CpgIntegrator, CpgState, Four
 
 NO_COUPLING = (0.0,) * 16
@@ -50,7 +48,7 @@ def _may_lift(leg: int, flying: list[int], state: CpgState, least_stance: int) -
 
 def coming_to_rest(integrator: CpgIntegrator, state: CpgState, inputs: CpgInputs, dt: float) -> CpgState:
     """Advance only legs in swing, uncoupled, so that they land as fast as they can."""
-    after = integrator.advance(state, replace(inputs, matrix=NO_COUPLING), dt)
+    after = integrator.advance(state, inputs._replace(matrix=NO_COUPLING), dt)
     return merge(after, state, [value > 0.0 for value in state.y2])
 
 

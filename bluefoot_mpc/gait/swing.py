@@ -7,6 +7,7 @@ zero velocity at both ends. Planar vectors are complex numbers, x + iy.
 
 from __future__ import annotations
 
+import functools
 import math
 
 
@@ -44,6 +45,7 @@ def matched_step(start: complex, goal: complex, drift: complex, s: float) -> com
     return start + (goal - start) * smooth + drift * (smooth - s)
 
 
+@functools.lru_cache(maxsize=16)  # one rate serves all feet for many steps
 def spring_transition(rate: float, damping_ratio: float, dt: float) -> tuple[float, float, float, float]:
     """Exact transition matrix of ``m e'' = -k e - b e'`` over `dt`, row-major.
 

@@ -7,11 +7,10 @@ x + iy, so that a rotation is a product.
 from __future__ import annotations
 
 import cmath
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class VirtualPose:
+class VirtualPose(NamedTuple):
     """Pose of the virtual robot in the world of the odometry start.
 
     Attributes:
