@@ -66,3 +66,54 @@ def test_a_safety_stop_does_not_wait_for_ever_for_the_feet():
     assert state.sit_level == 1.0
     assert state.torque == 0.0
     assert state.reason == "battery empty"
+
+
+def test_safe_never_gives_torque_back():
+    limp = play(ModeState(), Mode.OFF, 5.0)
+    stop = SafetyRequest(level=SafetyLevel.STOP, reasons=("hot",))
+    state = limp
+    for _ in range(100):
+        state = play(state, Mode.STAND, DT, safety=stop)
+        assert state.mode is Mode.SAFE
+        assert state.torque == 0.0
+    half = play(play(ModeState(), Mode.OFF, 1.7), Mode.OFF, DT)
+    assert 0.0 < half.torque < 1.0
+    assert play(half, Mode.STAND, DT, safety=stop).torque <= half.torque
+
+
+def test_the_first_reason_stays():
+    state = play(ModeState(), Mode.STAND, DT, safety=SafetyRequest(level=SafetyLevel.STOP, reasons=("hot",)))
+    later = SafetyRequest(level=SafetyLevel.STOP, reasons=("hot", "empty"))
+    assert play(state, Mode.STAND, 1.0, safety=later).reason == "hot"
+    fallen = play(state, Mode.STAND, DT, safety=later, tilt=70.0)
+    assert fallen.reason == "hot"
+    assert fallen.fallen
+
+
+def test_safe_cannot_be_asked_for():
+    assert play(ModeState(), Mode.SAFE, 1.0).mode is Mode.STAND
+
+
+@pytest.mark.parametrize("wanted", [Mode.SIT, Mode.OFF, Mode.STAND])
+def test_a_hold_only_ends_walking(wanted):
+    hold = SafetyRequest(level=SafetyLevel.HOLD, reasons=("silence",))
+    assert play(ModeState(), wanted, 1.0, safety=hold).mode is wanted
+
+
+def test_a_sit_request_that_passes_lets_the_robot_stand_again():
+    sit = SafetyRequest(level=SafetyLevel.SIT, reasons=("silence",))
+    state = play(ModeState(mode=Mode.WALK), Mode.WALK, 3.0, safety=sit)
+    assert state.mode is Mode.SIT
+    assert state.torque == 1.0
+    assert play(state, Mode.WALK, 2.0).mode is Mode.WALK
+
+
+def test_an_operators_stop_waits_for_the_feet_as_long_as_it_takes():
+    state = play(ModeState(mode=Mode.WALK), Mode.OFF, 10.0, walking=True)
+    assert state.mode is Mode.WALK
+    assert state.torque == 1.0
+
+
+def test_the_fall_tilt_is_the_configured_one():
+    assert play(ModeState(), Mode.STAND, DT, tilt=CONFIG.fall_tilt_deg - 0.1).mode is Mode.STAND
+    assert play(ModeState(), Mode.STAND, DT, tilt=CONFIG.fall_tilt_deg + 0.1).mode is Mode.SAFE

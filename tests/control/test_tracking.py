@@ -48,5 +48,16 @@ def test_corrections_stay_bounded_when_the_estimate_is_wrong():
     assert abs(corrected.yaw_rate) <= CONFIG.heading_bound + 1e-12
 
 
-def test_rest_forgets_the_heading():
-    assert np.isnan(tracking.rest(TrackingState(heading=1.0)).heading)
+def test_rest_forgets_the_heading_and_keeps_what_was_learnt():
+    state = tracking.rest(TrackingState(velocity=np.array([0.01, -0.02]), heading=1.0, yaw_rate=0.03))
+    assert np.isnan(state.heading)
+    np.testing.assert_array_equal(state.velocity, [0.01, -0.02])
+    assert state.yaw_rate == 0.03
+
+
+def test_each_axis_corrects_its_own_error():
+    wanted = Twist(velocity=np.array([0.05, -0.03]), yaw_rate=0.0)
+    state, corrected = tracking.advance(TrackingState(), wanted, np.array([0.04, -0.05]), 0.0, 0.02, CONFIG)
+    expected = CONFIG.velocity_gain * 0.02 * np.array([0.01, 0.02])
+    np.testing.assert_allclose(state.velocity, expected, rtol=1e-12)
+    np.testing.assert_allclose(corrected.velocity, wanted.velocity + expected, rtol=1e-12)

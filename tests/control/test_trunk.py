@@ -11,7 +11,7 @@ from bluefoot_mpc.control.trunk import TrunkPlanner
 from bluefoot_mpc.gait.gait import Gait, GaitConfig, GaitInputs
 from bluefoot_mpc.geometry import rotation_from_rpy
 from bluefoot_mpc.model.legs import AnkleConfig
-from bluefoot_mpc.model.robot import load_robot
+from bluefoot_mpc.model.robot import RobotModel, load_robot
 from bluefoot_mpc.types import BodyState, MotionCommand, TrunkPose
 from bluefoot_mpc.zmp.placement import PlacementConfig
 
@@ -153,6 +153,35 @@ def test_the_trunk_leans_away_from_the_leg_that_will_swing(robot):
             leaning[np.flatnonzero(ahead)[0]] += shift
     outward = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
     assert np.all(leaning * outward < 0.0)
+
+
+def test_the_lean_turns_with_the_feet_and_not_with_the_trunk(robot):
+    """The leg in the air is in the same place of b' whether the trunk looks that way or not."""
+    shifts = []
+    for yaw in (0.0, 0.3):
+        bench = Bench(robot, zmp=PlacementConfig(lead=0.0), config=UNTRIMMED)
+        settle(bench, 3.0, motion=pose(yaw=yaw))
+        settle(bench, 0.16, motion=pose(yaw=yaw), velocity=0.04, gait="walk")
+        assert bench.output.phase.swing.sum() == 1
+        shifts.append(bench.zmp - bench.reference.trunk_position[:2])
+    assert np.hypot(*shifts[0]) > 0.01
+    np.testing.assert_allclose(shifts[1], shifts[0], atol=0.002)
+
+
+def test_a_robot_whose_mass_lies_aside_keeps_its_commanded_pose_too(robot):
+    parts = [
+        replace(part, position=(part.position[0] + 0.01, *part.position[1:]))
+        if "battery" in part.name
+        else part
+        for part in robot.parameters.parts
+    ]
+    lopsided = RobotModel(replace(robot.parameters, parts=tuple(parts)))
+    bench = Bench(lopsided, zmp=PlacementConfig(gain=1.0), config=UNTRIMMED)
+    settle(bench, 40.0)
+    neutral = bench.reference.trunk_position
+    assert neutral[0] > 0.005
+    settle(bench, 40.0, motion=pose(y=0.04))
+    np.testing.assert_allclose(bench.reference.trunk_position - neutral, [0.0, 0.04, 0.0], atol=1e-3)
 
 
 def test_the_assumed_zmp_is_told_in_the_virtual_robots_frame(robot):

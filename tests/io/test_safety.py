@@ -194,6 +194,25 @@ def test_lost_joint_readings_make_it_sit_and_are_forgiven(supervisor, fake):
     assert supervisor.request.level is SafetyLevel.NONE
 
 
+def test_a_few_lost_readings_are_no_reason_to_sit(supervisor, fake):
+    valid = np.ones(16, dtype=bool)
+    valid[[2, 9]] = False  # an eighth, for ever
+    fake.next = make_frame(joint_valid=valid)
+    for _ in range(500):
+        supervisor.step(goal(0.0))
+    assert supervisor.request.level is SafetyLevel.NONE
+
+
+def test_a_fault_that_lasts_is_told_once(supervisor, fake):
+    for _ in range(5):
+        supervisor.step(goal(np.nan))
+    fake.next = make_frame(joint_temperature=np.full(16, 66.0))
+    for _ in range(5):
+        supervisor.step(goal(0.0))
+    assert supervisor.request.level is SafetyLevel.STOP  # the worse of the two
+    assert len(supervisor.request.reasons) == 2
+
+
 def test_thresholds_must_be_in_order():
     with pytest.raises(ConfigurationError, match="sit threshold"):
         SafetyConfig(voltage_sit=9.0, voltage_stop=9.6)
