@@ -10,6 +10,8 @@ import tyro
 
 from bluefoot_mpc.exceptions import ConfigurationError
 
+MAX_STATES = 1_000_000
+"""A million states take minutes; nobody learns from more."""
 _Unset = tyro.conf.arg(help_behavior_hint="")  # None means: as the scenario has it
 
 
@@ -136,8 +138,8 @@ class CheckCommand(ModelArguments):
     """Seed of the states."""
 
     def __post_init__(self) -> None:
-        if self.states < 1:
-            raise ConfigurationError(f"--states = {self.states} must be at least 1")
+        if not 1 <= self.states <= MAX_STATES:
+            raise ConfigurationError(f"--states = {self.states} must lie in 1..{MAX_STATES}")
         if self.seed < 0:
             raise ConfigurationError(f"--seed = {self.seed} must not be negative")
 

@@ -113,7 +113,7 @@ def _make_streams_usable() -> None:
 
 
 def _fail(message: str, status: int, as_json: bool, remarks: Sequence[str] = ()) -> int:
-    text = "\n".join((message, *remarks))
+    text = "\n".join((message.strip(), *remarks))
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     console.print(Text.assemble(("bluefoot: ", "bold red"), text))
     if as_json:

@@ -40,7 +40,7 @@ def urdf(command: UrdfCommand) -> Outcome:
     text = make_urdf(load_parameters(command.model))
     source = model_file(command.model or "bluefoot")
     if command.check:
-        return _check_urdf(text, command.out or source.with_suffix(".urdf"), source)
+        return _check_urdf(text, command.out or source.with_suffix(".urdf"), source, command.model)
     if command.out is None:
         return Outcome(data={"urdf": text}, page=(text.rstrip("\n"),))
     _write(command.out, text)
@@ -87,9 +87,12 @@ def power(command: PowerCommand) -> Outcome:
     return Outcome(data=dataclasses.asdict(budget), page=(table, "\n".join(lines)))
 
 
-def _check_urdf(text: str, file: Path, source: Path) -> Outcome:
-    fresh = file.is_file() and file.read_text(encoding="utf-8") == text
-    line = f"{file} is up to date" if fresh else f"{file} is out of date: bluefoot model urdf --out {file}"
+def _check_urdf(text: str, file: Path, source: Path, model: str | None) -> Outcome:
+    there = file.is_file()
+    fresh = there and file.read_text(encoding="utf-8") == text
+    again = " ".join(["bluefoot model urdf", *(["--model", model] if model else []), "--out", str(file)])
+    state = "is out of date; write it anew" if there else "does not exist; write it"
+    line = f"{file} is up to date" if fresh else f"{file} {state} with: {again}"
     data = {"file": file, "source": source, "up_to_date": fresh}
     return Outcome(status=OK if fresh else FAILED, data=data, page=(line,))
 

@@ -97,7 +97,7 @@ def _panels(series: RunSeries, stall_torque: float, period: float) -> list[Panel
 
 
 def _figures(panels: Sequence[Panel], series: RunSeries) -> dict[str, Any]:
-    """Figures for the page's script, with pushes and mode changes drawn into every time axis."""
+    """Figures for the page's script, with pushes and changes of mode and gait drawn into every time axis."""
     start = plots.replay_start(series) if len(series.time) else 0.0
     figures: dict[str, Any] = {"start": start, "duration": series.duration}
     for panel in panels:
@@ -121,6 +121,7 @@ def _marks(series: RunSeries) -> list[dict[str, Any]]:
     for k in range(1, len(series.mode)):
         if series.mode[k] != series.mode[k - 1]:
             shapes.append(_band(float(series.time[k]), float(series.time[k]), NEUTRAL))
+    shapes += [_band(time, time, NEUTRAL) for time, text in series.events if text.startswith("gait ")]
     pushed = (series.push != 0.0).any(axis=1)
     step = float(series.time[1] - series.time[0]) if len(series.time) > 1 else 0.0
     shapes += [_band(start, end, BAD) for start, end in stretches(pushed, series.time, step)]

@@ -202,7 +202,7 @@ def _attitude_figures(axis: str, goals: Mapping[str, _Goal]) -> list[tuple[str, 
 
 
 def _balance_tiles(summary: Mapping[str, Any], goals: Mapping[str, _Goal]) -> list[Tile | None]:
-    swing, feet = "swing_clearance_median_m", "with three feet down or more"
+    swing, feet = "swing_clearance_median_m", "three or more feet down"
     return [
         _tile("Swing clearance", summary.get(swing), 1, "mm", goals.get(swing), scale=1e3, note="median"),
         _tile("ZMP inside support", summary.get("zmp_inside_fraction"), 0, "%", scale=100.0, note=feet),

@@ -72,3 +72,16 @@ def test_a_missing_or_impossible_model_is_wrong_use(capfd, tmp_path, command):
     status, data = run(capfd, command, "--model", str(broken))
     assert status == 2
     assert "link_length" in data["error"]
+
+
+def test_a_missing_urdf_is_told_with_the_whole_command(capsys, tmp_path):
+    file = tmp_path / "mine.urdf"
+    words = ["model", "urdf", "--check", "--model", "bluefoot_large", "--out", str(file)]
+    assert main(words) == 1
+    hint = f"bluefoot model urdf --model bluefoot_large --out {file}"
+    assert f"{file} does not exist; write it with: {hint}" in capsys.readouterr().out
+    assert main(hint.split()[1:]) == 0
+    assert main(words) == 0
+    file.write_text("<robot/>")
+    assert main(words) == 1
+    assert "out of date; write it anew with" in capsys.readouterr().out

@@ -95,6 +95,7 @@ def test_every_command_takes_json(words, kind):
         (["run", "walk", "--seed", "1.5"], ["--seed", "1.5", "whole number"]),
         (["run", "walk", "--speed"], ["--speed"]),
         (["model", "check", "--states", "0"], ["--states", "0"]),
+        (["model", "check", "--states", "99999999999"], ["--states", "1000000"]),
         (["drive", "--timeout", "0"], ["--timeout", "0"]),
         (["list", "--seed", "1"], ["--seed", "--json"]),
         (["--debug", "list"], ["--debug stands before the command", "list", "drive"]),
