@@ -186,10 +186,12 @@ def _writing(file: Path) -> Iterator[None]:
     """Turn what hinders writing a file into one message; half a file is not left behind."""
     try:
         yield
-    except OSError as error:
+    except BaseException as error:
         with suppress(OSError):
             file.unlink()
-        raise ConfigurationError(f"cannot write {file}: {error.strerror or error}") from error
+        if isinstance(error, OSError):
+            raise ConfigurationError(f"cannot write {file}: {error.strerror or error}") from error
+        raise
 
 
 @contextmanager

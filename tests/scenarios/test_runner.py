@@ -134,6 +134,17 @@ def test_a_report_that_cannot_be_written_is_one_message_and_the_log_stays(tmp_pa
     assert {file.name for file in tmp_path.iterdir()} == {"log.mcap", "summary.json", "config.toml"}
 
 
+def test_ctrl_c_while_the_report_is_written_leaves_no_half_of_it(tmp_path, monkeypatch):
+    def interrupted(data, summary, model, path, checks):
+        path.write_text("<html>")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runner, "write_report", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run("stand", RunOptions(duration=1.0, out=tmp_path))
+    assert {file.name for file in tmp_path.iterdir()} == {"log.mcap", "summary.json", "config.toml"}
+
+
 def test_a_paced_run_takes_its_time_and_an_unpaced_one_does_not(tmp_path):
     resolved = resolve(SHIPPED["stand"], RunOptions(duration=1.0))
     options = RunOptions(report=False, out=tmp_path)
