@@ -76,9 +76,10 @@ def test_safe_never_gives_torque_back():
         state = play(state, Mode.STAND, DT, safety=stop)
         assert state.mode is Mode.SAFE
         assert state.torque == 0.0
-    half = play(play(ModeState(), Mode.OFF, 1.7), Mode.OFF, DT)
-    assert 0.0 < half.torque < 1.0
-    assert play(half, Mode.STAND, DT, safety=stop).torque <= half.torque
+    rising = play(limp, Mode.STAND, 0.3)
+    assert 0.0 < rising.torque < 1.0
+    assert rising.sit_level < 1.0
+    assert play(rising, Mode.STAND, DT, safety=stop).torque <= rising.torque
 
 
 def test_the_first_reason_stays():

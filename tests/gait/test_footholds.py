@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from bluefoot_mpc.gait.footholds import FootholdConfig
-from tests.gait.walker import DT, FOOTHOLD, STANCE, TROT_TIMING, command, drive, make
+from bluefoot_mpc.gait.gait import Gait, GaitConfig
+from bluefoot_mpc.settings import build, merge, to_table
+from tests.gait.walker import DT, FOOTHOLD, REFERENCE, STANCE, TROT_TIMING, command, drive, make
 
 EARLY = replace(FOOTHOLD, early_contact=True, early_progress=0.5, offset_time=0.5)
 DOWN = np.ones(4, dtype=bool)
@@ -139,3 +141,68 @@ def test_impossible_values_are_refused(values: dict[str, float]) -> None:
 
     with pytest.raises(ConfigurationError):
         FootholdConfig(**values)
+
+
+def test_a_foot_leaves_the_ground_at_rest() -> None:
+    for law in ("virtual_force", "minimum_jerk"):
+        walker = make(foothold=replace(FOOTHOLD, law=law), max_acceleration=10.0)
+        drive(walker, command(0.1), 2.0, 0.001)
+        while not walker.state.feet[0].swinging:
+            before = drive(walker, command(0.1), 0.001, 0.001)
+        after = drive(walker, command(0.1), 0.003, 0.001)
+        moved = after.in_world[-1, 0] - before.in_world[-1, 0]
+        assert moved.real > 0.0  # towards its foothold, and never back first
+        assert abs(moved) < 0.1 * 0.1 * 0.004 * 10.0
+
+
+def test_feet_land_in_the_same_place_whatever_the_tick() -> None:
+    """Lift-off and landing happen inside a tick, and count from the moment at which they do."""
+    smooth = replace(FOOTHOLD, law="minimum_jerk", vertical="quintic")
+    timing = replace(TROT_TIMING, cycle_min=0.3, cycle_max=0.3)
+    places = []
+    for substep, dt in ((0.02, 0.02), (0.0005, 0.02)):
+        walker = make(timing, smooth, substep=substep, max_acceleration=10.0)
+        run = drive(walker, command(0.2), 4.0, dt)
+        down = np.flatnonzero(run.swing[:-1, 0] & ~run.swing[1:, 0])[3:] + 1
+        # In b' at the tick's end: carried back to the landing by nothing but the commanded speed.
+        steps = np.diff(run.in_world[down, 0].real)
+        places.append(steps)
+    np.testing.assert_allclose(places[0][:8], places[1][:8], atol=4e-4)
+    np.testing.assert_allclose(places[1].mean(), 0.2 * 0.3, atol=1e-3)
+
+
+def test_a_foothold_that_waited_keeps_its_height() -> None:
+    walker = make(foothold=replace(FOOTHOLD, law="minimum_jerk"))
+    to_progress(walker, 0.5)
+    walker.set_footholds(STANCE + np.array([0.01, 0.0, 0.012]), DOWN)
+    heights = drive(walker, command(0.08), 1.2).foot_height[:, 0]
+    swing = walker.state.feet[0]
+    assert 0.012 in np.round(heights, 12)
+    assert swing.later is None
+
+
+def test_a_second_early_landing_counts_from_the_foothold_as_it_was_shifted() -> None:
+    walker = make(foothold=replace(EARLY, offset_time=1e6, offset_limit=0.2), max_acceleration=100.0)
+    shift = STANCE + np.array([0.01, 0.0, 0.02])
+    to_progress(walker, 0.6)
+    walker.step(command(0.08, contact=DOWN, foot_position=shift), DT)
+    first = walker.state.feet[0].offset
+    while walker.state.feet[0].turning:
+        walker.step(command(0.08, contact=DOWN), DT)
+    to_progress(walker, 0.6)
+    walker.step(command(0.08, contact=DOWN, foot_position=shift), DT)
+    assert walker.state.feet[0].offset == pytest.approx(first, abs=2e-3)
+
+
+def test_swinging_feet_are_displaced_towards_the_fall() -> None:
+    table = {"reflex": {"enabled": True, "threshold": 50.0, "shift": 0.02, "shift_limit": 0.03}}
+    config = build(GaitConfig, merge(to_table(REFERENCE), table))
+    landed = {}
+    for rate in (0.0, 1.0):
+        walker = Gait(config, STANCE)
+        falling = command(0.05, contact=UP, tilt_rate_error=np.array([-rate, rate]))
+        run = drive(walker, falling, 0.6)
+        down = np.flatnonzero(run.swing[:-1, 0] & ~run.swing[1:, 0])[0] + 1
+        landed[rate] = run.in_world[down, 0]
+    # Nose down is forward, left side down is left.
+    assert landed[1.0] - landed[0.0] == pytest.approx(0.02 + 0.02j, abs=2e-3)

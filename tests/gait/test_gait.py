@@ -1,6 +1,5 @@
 import copy
 import math
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +8,12 @@ import pytest
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.gait.couplings import COUPLINGS
 from bluefoot_mpc.gait.footholds import FootholdConfig
-from bluefoot_mpc.gait.gait import Gait, GaitConfig, GaitInputs
+from bluefoot_mpc.gait.gait import Gait, GaitConfig
+from bluefoot_mpc.gait.reflex import reflex
 from bluefoot_mpc.settings import build, merge, to_table
 from tests.gait.walker import DT, FOOTHOLD, REFERENCE, STANCE, TROT_TIMING, command, drive, make
 
+UP = np.array([False, True, True, True])
 SMOOTH = replace(FOOTHOLD, law="minimum_jerk", vertical="quintic")
 
 
@@ -204,14 +205,46 @@ def test_reflex_hurries_the_legs_towards_the_fall() -> None:
     assert falling.state.feet[0].z < calm.state.feet[0].z
 
 
-def test_step_is_quick() -> None:
-    # The budget is 150 µs; this only catches a regression by an order of magnitude.
+def test_the_reflex_lowers_the_step_of_either_profile() -> None:
+    for vertical in ("sine", "quintic"):
+        table = {
+            "reflex": {"enabled": True, "threshold": 0.5, "speed_gain": 0.0},
+            "foothold": {"vertical": vertical},
+        }
+        config = build(GaitConfig, merge(to_table(REFERENCE), table))
+        tops = []
+        for rate in (0.0, 0.6):
+            walker = Gait(config, STANCE)
+            falling = command(0.05, contact=UP, tilt_rate_error=np.array([0.0, rate]))
+            tops.append(drive(walker, falling, 0.4).foot_height[:, 0].max())
+        assert 0.7 < tops[1] / tops[0] < 0.9  # 1 / sqrt(1.5), once the oscillator has followed
+
+
+def test_the_schedule_is_that_of_an_undisturbed_robot() -> None:
+    config = build(GaitConfig, merge(to_table(REFERENCE), {"reflex": {"enabled": True, "threshold": 0.2}}))
+    calm, falling = Gait(config, STANCE), Gait(config, STANCE)
+    for walker in (calm, falling):
+        drive(walker, command(0.05, contact=UP), 2.0)
+    falling.state.reflex = reflex((0.0, 2.0), [1.0 + 0.0j] * 4, UP.tolist(), config.reflex)
+    assert max(falling.state.reflex.psi_omega) > 1.4
+    np.testing.assert_array_equal(falling.schedule(1.0, DT).stance, calm.schedule(1.0, DT).stance)
+
+
+def test_a_command_too_small_to_be_one_starts_nothing() -> None:
     walker = make()
-    inputs = GaitInputs(velocity=np.array([0.06, 0.0]), yaw_rate=0.1)
-    begin = time.perf_counter()
-    for _ in range(200):
-        walker.step(inputs, DT)
-    assert (time.perf_counter() - begin) / 200 < 1.5e-3
+    still = REFERENCE.still_speed
+    assert not drive(walker, command(0.9 * still, 0.9 * still), 0.2).walking.any()
+    assert drive(walker, command(1.1 * still), 0.02).walking.all()
+
+
+def test_only_an_unbroken_rest_counts_on_the_way_to_standing() -> None:
+    walker = make()
+    drive(walker, command(0.05), 2.0)
+    for _ in range(12):  # never a whole cycle without a command
+        drive(walker, command(), 0.2)
+        drive(walker, command(0.0, 0.05), 0.1)
+    assert walker.state.walking
+    assert not walker.state.landing
 
 
 def test_the_reflex_sees_feet_from_the_trunk_and_not_from_the_virtual_robot() -> None:
