@@ -99,7 +99,7 @@ def _rows(summary: Summary) -> list[Row]:
         ("servo temperature", _scaled(get("servo_temp_max_c"), 1.0, 1, "°C"), "the hottest"),
         ("energy", _scaled(get("energy_j"), 1.0, 0, "J"), _transport(summary)),
         ("tick", _scaled(tick.get("p50"), 1.0, 0, "µs median"), _tick_tail(summary)),
-        ("speed of the simulation", _scaled(get("real_time_factor"), 1.0, 1, "x real time"), ""),
+        ("simulation", _scaled(get("real_time_factor"), 1.0, 1, "x real time"), ""),
     ]
     figures = (get("figures") or {}).items()
     rows += [_figure_row(name, value) for name, value in figures if name not in _NOT_SHOWN]

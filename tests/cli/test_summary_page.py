@@ -124,8 +124,12 @@ def test_an_interrupted_run_has_not_failed(page):
     assert "FAILED" not in text
 
 
-def test_labels_stay_on_one_line_however_narrow_the_page(page):
-    assert "speed of the simulation" in page({**SUMMARY, "lateral_drift_m": -0.035}, width=80)
+def test_no_row_wraps_on_a_terminal_of_80_columns(page):
+    figures = {"lift_off_lags": [0.0, 0.4942, 0.4942, 0.0], "footfall_order": "FR RL FL RR"}
+    text = page({**SUMMARY, "lateral_drift_m": -0.032, "yaw_drift_deg": -0.7, "figures": figures}, width=80)
+    rows = text.split("\n\n")[1].splitlines()
+    assert any("sideways -32 mm, turned -0.7°" in row for row in rows)
+    assert all(row.startswith(" ") and row[1].strip() for row in rows)
 
 
 def test_what_is_out_of_the_ordinary_is_told_once_a_kind(page):
