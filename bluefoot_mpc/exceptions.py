@@ -51,3 +51,9 @@ class DeviceError(BlueFootError):
     """A device refused to work, or was lost."""
 
     exit_status = 3
+
+
+class SimulationError(BlueFootError):
+    """The simulated physics left what can happen: no result of the run can be trusted."""
+
+    exit_status = 1

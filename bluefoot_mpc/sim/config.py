@@ -159,14 +159,12 @@ class SimConfig:
     pushes: tuple[PushConfig, ...] = ()
 
     def __post_init__(self) -> None:
-        require_positive(
-            command_period=self.command_period, physics_period=self.physics_period, voltage=self.voltage,
-            load_friction_speed=self.load_friction_speed,
-        )  # fmt: skip
-        require_nonnegative(
-            latency=self.latency, standby_current=self.standby_current, settle_time=self.settle_time
-        )
+        require_positive(voltage=self.voltage, load_friction_speed=self.load_friction_speed)
+        require_nonnegative(standby_current=self.standby_current)
         require_range(1e-4, 2e-3, physics_period=self.physics_period)
+        require_range(1e-3, 0.2, command_period=self.command_period)
+        require_range(0.0, 60.0, settle_time=self.settle_time)
+        require_range(0.0, 1.0, latency=self.latency)
         if self.backlash_deg is not None:
             require_range(0.0, 5.0, backlash_deg=self.backlash_deg)
         for name, period in (

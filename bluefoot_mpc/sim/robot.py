@@ -8,7 +8,7 @@ from collections import deque
 import mujoco
 import numpy as np
 
-from bluefoot_mpc.exceptions import DeviceError
+from bluefoot_mpc.exceptions import SimulationError
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.sim.config import SimConfig
 from bluefoot_mpc.sim.inertial import InertialWindows
@@ -133,7 +133,7 @@ class SimRobot:
         A command that is not finite is discarded, as the bus driver does.
 
         Raises:
-            DeviceError: the physics became unstable.
+            SimulationError: the physics became unstable.
         """
         q, speed, limit = command.position, command.speed, command.torque_limit
         if math.isfinite(q @ q + speed @ speed + limit @ limit):
@@ -191,7 +191,7 @@ class SimRobot:
         first, count = self._advance()
         if not math.isfinite(self._pose[2]):
             now = self._step * self.config.physics_period
-            raise DeviceError(f"the simulation became unstable before t = {now:.3f} s")
+            raise SimulationError(f"the simulation became unstable before t = {now:.3f} s")
         self._truth.power, voltage = self._bank.finish_frame(self._steps)
         self._inertial.means(count)
         return self._sensors.measure(self._step, first, count, voltage)

@@ -63,7 +63,7 @@ def test_a_push_reaches_the_simulator():
         ("control.gait.trot.cycle_min=fast", "cycle_min = 'fast' must be of type float"),
         ("control.gait.trot.cycle_min=-1.0", "cycle_min = -1.0 must be positive"),
         ("control.zmp.gain=nan", "must be finite"),
-        ("sim.latency=-0.1", "latency = -0.1 must not be negative"),
+        ("sim.latency=-0.1", "latency = -0.1 must lie in 0..1"),
         ("scenario.speed=9.0", "beyond what the robot can do"),
         ("scenario.gait=gallop", "gallop.*trot, walk"),
         ("model.legs.hip_offset=-0.1", "hip_offset = -0.1 must be positive"),

@@ -5,7 +5,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from bluefoot_mpc.exceptions import DeviceError
+from bluefoot_mpc.exceptions import SimulationError
 from bluefoot_mpc.geometry import rpy_from_quaternion
 from bluefoot_mpc.io.robot import Robot
 from bluefoot_mpc.model.robot import load_robot
@@ -209,7 +209,7 @@ def test_blown_up_physics_is_reported(model, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     robot = SimRobot(model, SimConfig())
     robot.data.qvel[:] = np.nan
-    with pytest.raises(DeviceError, match="unstable"):
+    with pytest.raises(SimulationError, match="unstable"):
         robot.step(command(model.stance_joints))
 
 
