@@ -39,6 +39,9 @@ def read_toml(path: Path) -> dict[str, Any]:
 def build(cls: type[T], table: Mapping[str, Any], where: str = "") -> T:
     """Make a configuration dataclass from a TOML table, nested tables included.
 
+    What a nested table does not name keeps the value that the field has by
+    default, which need not be the default of the nested dataclass.
+
     Args:
         cls: a dataclass whose fields are numbers, strings, booleans, tuples of
             them, or dataclasses again.
@@ -57,7 +60,7 @@ def build(cls: type[T], table: Mapping[str, Any], where: str = "") -> T:
     for name, field in fields.items():
         label = f"{where}.{name}" if where else name
         if name in table:
-            values[name] = _convert(hints[name], table[name], label)
+            values[name] = _convert(hints[name], _filled(field, table[name]), label)
         elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
             raise ConfigurationError(f"missing value: {label}")
     try:
@@ -139,6 +142,14 @@ def require_finite(**values: float | Sequence[float]) -> None:
         entries = value if isinstance(value, Sequence) else (value,)
         if not all(math.isfinite(entry) for entry in entries):
             raise ConfigurationError(f"{name} = {value!r} must be finite")
+
+
+def _filled(field: dataclasses.Field[Any], value: Any) -> Any:
+    """A table for a nested dataclass, filled up with the field's own default."""
+    if not isinstance(value, Mapping) or field.default_factory is dataclasses.MISSING:
+        return value
+    default = field.default_factory()
+    return merge(to_table(default), value) if dataclasses.is_dataclass(default) else value
 
 
 def _convert(hint: Any, value: Any, label: str) -> Any:

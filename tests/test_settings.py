@@ -1,12 +1,13 @@
 import math
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.settings import (
     build,
     dump_toml,
@@ -28,10 +29,17 @@ class Inner:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
+class Middle:
+    inner: Inner = field(default_factory=lambda: Inner(gain=4.0, count=40))
+    scale: float = 1.0
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Outer:
     name: str
     on: bool = False
     inner: Inner = field(default_factory=Inner)
+    middle: Middle = field(default_factory=lambda: Middle(scale=3.0))
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
     shares: tuple[float, ...] = ()
     inners: tuple[Inner, ...] = ()
@@ -95,6 +103,17 @@ def test_a_bad_table_is_refused_by_name(table, message):
 def test_an_unknown_key_lists_the_valid_ones():
     with pytest.raises(UnknownNameError, match="count, gain"):
         build(Outer, {"name": "x", "inner": {"gian": 1.0}})
+
+
+def test_a_part_of_a_table_keeps_the_fields_own_defaults():
+    built = build(Outer, {"name": "x", "middle": {"inner": {"gain": 5.0}}})
+    assert built.middle == Middle(scale=3.0, inner=Inner(gain=5.0, count=40))
+    assert build(Outer, {"name": "x", "middle": {}}).middle.scale == 3.0
+
+
+def test_part_of_a_gaits_timing_does_not_make_it_another_gait():
+    walk = build(GaitConfig, {"walk": {"cycle_max": 1.4}}).walk
+    assert walk == replace(GaitConfig().walk, cycle_max=1.4)
 
 
 def test_whole_numbers_are_floats_where_floats_are_wanted():

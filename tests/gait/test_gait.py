@@ -240,10 +240,10 @@ def test_a_command_too_small_to_be_one_starts_nothing() -> None:
 def test_only_an_unbroken_rest_counts_on_the_way_to_standing() -> None:
     walker = make()
     drive(walker, command(0.05), 2.0)
-    for _ in range(12):  # never a whole cycle without a command
-        drive(walker, command(), 0.2)
-        drive(walker, command(0.0, 0.05), 0.1)
-    assert walker.state.walking
+    drive(walker, command(), 0.6)  # slowed down, and not yet a cycle on the spot
+    for _ in range(12):
+        assert drive(walker, command(), 0.2).walking.all()
+        assert drive(walker, command(0.0, 0.02), 0.1).walking.all()
     assert not walker.state.landing
 
 
