@@ -5,7 +5,7 @@ import pytest
 
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.gait.calibration import calibrate, measure
-from bluefoot_mpc.gait.couplings import COUPLINGS, TROT, WALK, coupling
+from bluefoot_mpc.gait.couplings import COUPLINGS, TROT, WALK, coupling, scaled
 from bluefoot_mpc.gait.cpg import (
     CpgConfig,
     CpgInputs,
@@ -16,6 +16,7 @@ from bluefoot_mpc.gait.cpg import (
     derivative,
     on_circle,
 )
+from bluefoot_mpc.gait.network import coming_to_rest
 from bluefoot_mpc.gait.timing import GaitTiming, cycle_time, step_height, uncoupled_period
 
 ALONE = (0.0,) * 16
@@ -217,3 +218,19 @@ def test_timing_laws() -> None:
 def test_impossible_timing_is_refused(values: dict[str, float]) -> None:
     with pytest.raises(ConfigurationError):
         GaitTiming(**values)
+
+
+@pytest.mark.parametrize("phase", [0.02, 0.1, 0.2])
+@pytest.mark.parametrize("gait", COUPLINGS)
+def test_on_the_way_to_rest_a_leg_lands_in_its_own_time(gait: str, phase: float) -> None:
+    """Uncoupled, the rest of a half turn takes what the oscillator alone needs for it."""
+    config, alpha, omega = CpgConfig(), 0.3, 8.0
+    state = on_circle((phase, 0.5, 0.6, 0.9), alpha)
+    inputs = CpgInputs(omega=omega, alpha=alpha, matrix=scaled(COUPLINGS[gait].matrix, 0.15))
+    time = 0.0
+    while state.y2[0] > 0.0:
+        before = state
+        state = coming_to_rest(CpgIntegrator(config), state, inputs, 0.001)
+        assert state.y2[1:] == before.y2[1:]
+        time += 0.001
+    assert time == pytest.approx((1.0 - phase / alpha) * math.pi / (omega * (1.0 - alpha)), abs=0.02)
