@@ -11,7 +11,7 @@ from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.engine import GaitEngine
 from bluefoot_mpc.gait.footholds import Stride, early_contact, freeze, virtual_foothold
-from bluefoot_mpc.gait.reflex import IDLE, ReflexOutput, reflex
+from bluefoot_mpc.gait.reflex import IDLE, ReflexOutput, is_quiet, reflex
 from bluefoot_mpc.gait.state import GaitInputs, GaitOutput, GaitState
 from bluefoot_mpc.gait.transition import place_of
 from bluefoot_mpc.types import BoolArray, ContactSchedule, FloatArray, GaitPhase
@@ -138,7 +138,7 @@ class Gait:
         if not self.config.reflex.enabled:
             return IDLE
         error: list[float] = np.asarray(inputs.tilt_rate_error, dtype=float).tolist()
-        if not all(map(math.isfinite, error)):
+        if not all(map(math.isfinite, error)) or is_quiet(error, self.config.reflex):
             return IDLE
         if estimates is None:
             places = [foot.in_b(state.pose) for foot in state.feet]

@@ -55,6 +55,8 @@ class ReflexOutput:
 
 
 IDLE = ReflexOutput()
+NEGLIGIBLE = -12.0
+"""Exponent of an activation that counts as none: 6e-6."""
 
 
 def fall_direction(tilt_rate_error: Sequence[float]) -> complex:
@@ -81,6 +83,12 @@ def activation(fall: complex, foot: complex, contact: bool, config: ReflexConfig
     along = (foot.real * fall.real + foot.imag * fall.imag) / reach if reach > 0.0 else 0.0
     exponent = config.sharpness * (abs(fall) + along - config.threshold)
     return 0.5 * (1.0 + math.tanh(0.5 * exponent))
+
+
+def is_quiet(tilt_rate_error: Sequence[float], config: ReflexConfig) -> bool:
+    """Whether no leg, wherever it is, would react: no v_i is above twice the speed of the fall."""
+    fastest = 2.0 * abs(fall_direction(tilt_rate_error))
+    return config.shift == 0.0 and config.sharpness * (fastest - config.threshold) < NEGLIGIBLE
 
 
 def reflex(

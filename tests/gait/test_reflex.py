@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
 
-from bluefoot_mpc.gait.reflex import IDLE, ReflexConfig, activation, fall_direction, reflex
+from bluefoot_mpc.gait.reflex import (
+    IDLE,
+    NEGLIGIBLE,
+    ReflexConfig,
+    activation,
+    fall_direction,
+    is_quiet,
+    reflex,
+)
 
 FEET = (0.165 + 0.165j, 0.165 - 0.165j, -0.165 + 0.165j, -0.165 - 0.165j)
 AIR = (False,) * 4
@@ -37,6 +45,17 @@ def test_shift_follows_the_fall_and_is_bounded() -> None:
     config = ReflexConfig(enabled=True, shift=0.02, shift_limit=0.03)
     assert reflex((0.0, 1.0), FEET, AIR, config).shift == pytest.approx(0.02)
     assert abs(reflex((5.0, 5.0), FEET, AIR, config).shift) == pytest.approx(0.03)
+
+
+def test_quiet_is_where_no_leg_reacts() -> None:
+    edge = 0.5 * (ON.threshold + NEGLIGIBLE / ON.sharpness)
+    for size, quiet in ((0.99 * edge, True), (1.01 * edge, False)):
+        for angle in np.linspace(0.0, 6.0, 7):
+            error = (size * np.cos(angle), size * np.sin(angle))
+            assert is_quiet(error, ON) == quiet
+            strongest = activation(fall_direction(error), fall_direction(error), False, ON)
+            assert (strongest < np.exp(NEGLIGIBLE)) == quiet
+    assert not is_quiet((0.0, 0.0), ReflexConfig(shift=0.01))
 
 
 def test_extreme_rates_do_not_overflow() -> None:
