@@ -164,7 +164,10 @@ class RomCommand(ModelArguments):
 
 @dataclass(frozen=True, kw_only=True)
 class PowerCommand(ModelArguments):
-    """Power budget and run-times on one charge."""
+    """Power budget and run-times on one charge, or what a recorded run drew."""
+
+    log: Annotated[Path | None, tyro.conf.arg(metavar="LOG", help_behavior_hint="")] = None
+    """The log.mcap of a simulated run, or the run's folder: integrate what its servos drew."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,12 +9,13 @@ from rich.table import Table
 
 from bluefoot_mpc.cli.arguments import CheckCommand, PowerCommand, RomCommand, UrdfCommand
 from bluefoot_mpc.cli.outcome import FAILED, OK, Outcome
-from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.model.parameters import load_parameters
-from bluefoot_mpc.model.power import power_budget
+from bluefoot_mpc.exceptions import ConfigurationError, LogError
+from bluefoot_mpc.model.parameters import RobotParameters, load_parameters
+from bluefoot_mpc.model.power import energy_report, power_budget
 from bluefoot_mpc.model.resources import model_file
 from bluefoot_mpc.model.rom import study_range_of_motion
 from bluefoot_mpc.model.urdf import make_urdf
+from bluefoot_mpc.runtime.log import read_log
 from bluefoot_mpc.sim.parity import check_parity
 from bluefoot_mpc.viz.rom import save_rom_pictures
 
@@ -66,6 +67,8 @@ def rom(command: RomCommand) -> Outcome:
 def power(command: PowerCommand) -> Outcome:
     """Show the power budget."""
     parameters = load_parameters(command.model)
+    if command.log is not None:
+        return _drawn(parameters, command.log)
     budget = power_budget(parameters.power)
     table = Table(title=f"Power of {parameters.name}", title_justify="left")
     for heading in ("consumer", "net", "V", "A", "W"):
@@ -85,6 +88,21 @@ def power(command: PowerCommand) -> Outcome:
         ),
     ]
     return Outcome(data=dataclasses.asdict(budget), page=(table, "\n".join(lines)))
+
+
+def _drawn(parameters: RobotParameters, file: Path) -> Outcome:
+    log = read_log(file)
+    if len(log.truth) < 2:
+        raise LogError(f"{file} holds no record of the servos' power: only simulated runs have one")
+    use = energy_report(parameters.power, log.stack("truth", "time"), log.stack("truth", "electrical_power"))
+    lines = (
+        f"servos {use.servo_mean_power:.1f} W on average, {use.servo_peak_power:.1f} W at most; "
+        f"whole robot {use.mean_power:.1f} W over {use.duration:.1f} s",
+        f"{use.energy:.0f} J, {100.0 * use.charge_share:.2f} % of the charge",
+        f"at this rate {use.pooled_run_time:.0f} min with all packs pooled, "
+        f"{use.servo_run_time:.0f} min for the servos on their own packs",
+    )
+    return Outcome(data=dataclasses.asdict(use), page=("\n".join(lines),))
 
 
 def _check_urdf(text: str, file: Path, source: Path, model: str | None) -> Outcome:

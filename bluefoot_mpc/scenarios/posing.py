@@ -162,5 +162,5 @@ class Pose(Scenario):
 POSITION_ERROR = "trunk_position_error_rms_m"
 TRACKING = 0.010
 """m, RMS error of the trunk's place while it follows a slow sine."""
-TRACKING_DEG = 2.5
+TRACKING_DEG = 1.0
 """RMS error of the trunk's angles while it follows a slow sine through soft servos."""

@@ -48,6 +48,7 @@ def test_urdf_that_cannot_be_written_is_wrong_use(capfd, tmp_path):
     assert "cannot write" in data["error"]
 
 
+@pytest.mark.slow
 def test_rom_writes_pictures_and_the_numbers_of_the_thesis(capfd, tmp_path):
     status, data = run(capfd, "rom", "--out", str(tmp_path / "rom"))
     assert status == 0
@@ -60,6 +61,21 @@ def test_power_gives_the_table_of_the_thesis(capfd):
     assert status == 0
     assert data["nominal"] == pytest.approx(137.825)
     assert int(data["nominal_run_time"]) == 41
+
+
+@pytest.mark.slow
+def test_power_of_a_recorded_run(capfd, tmp_path):
+    from bluefoot_mpc.scenarios import RunOptions
+    from bluefoot_mpc.scenarios import run as run_scenario
+
+    result = run_scenario("walk", RunOptions(duration=5.0, out=tmp_path, report=False))
+    status, data = run(capfd, "power", "--log", str(tmp_path / "log.mcap"))
+    assert status == 0
+    # The summary integrates its measurement window, the last 1.5 s: the same power.
+    assert 10.0 < data["servo_mean_power"] < 40.0
+    assert data["servo_energy"] == pytest.approx(data["servo_mean_power"] * data["duration"])
+    assert result.summary["energy_j"] < data["servo_energy"] < data["energy"]
+    assert 60.0 < data["pooled_run_time"] < 200.0
 
 
 @pytest.mark.parametrize("command", ["check", "urdf", "rom", "power"])

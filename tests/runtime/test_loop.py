@@ -18,6 +18,8 @@ from bluefoot_mpc.scenarios.walking import Push, Walk
 from bluefoot_mpc.sim.robot import SimRobot
 from bluefoot_mpc.types import Mode
 
+pytestmark = pytest.mark.slow
+
 
 class SpyRobot(SimRobot):
     """The simulated robot, remembering what reached it."""

@@ -23,6 +23,8 @@ from bluefoot_mpc.scenarios.registry import SHIPPED
 from bluefoot_mpc.scenarios.runner import simulate
 from bluefoot_mpc.types import MotionCommand, TrunkPose
 
+pytestmark = pytest.mark.slow
+
 SCRIPTS = Path(__file__).parents[2] / "scripts"
 
 
