@@ -1,7 +1,8 @@
 """The control loop, the same for every robot: frame in, command out, nothing lost.
 
-Whatever happens in a tick, the robot is brought to rest under torque and made
-limp before the loop ends, and what was recorded stays.
+Whatever goes wrong in a tick, the robot sinks under torque before it is made
+limp, and what was recorded stays. A run that simply ends leaves the robot limp
+at once: a scenario that wants it seated commands that before it is over.
 """
 
 from __future__ import annotations
@@ -140,12 +141,16 @@ def _ticks(
             output = controller.step(frame, motion, safety)
         except Exception as error:  # The boundary that keeps a robot standing when its controller breaks.
             log.exception("the controller failed at %.2f s", frame.time)
-            _ramp_down(robot, frame)
+            _ramp_down(robot, data, frame)
             return f"controller error: {type(error).__name__}: {error}"
         tick_us = (time.perf_counter_ns() - tick_start) * 1e-3
         telemetry = replace(output.telemetry, tick_us=tick_us)
         output = ControlOutput(command=output.command, telemetry=telemetry)
-        _record(data, hooks, frame, motion, safety, output)
+        try:
+            _record(data, hooks, frame, motion, safety, output)
+        except Exception:  # A full disk or a broken viewer is no reason to drop the robot.
+            _ramp_down(robot, data, frame)
+            raise
         frame = robot.step(output.command)
         mode, limp = telemetry.mode, not any(output.command.torque_limit.tolist())
         if mode is Mode.SAFE:
@@ -192,12 +197,15 @@ def _record(
         observer(frame, output, truth)
 
 
-def _ramp_down(robot: SafetySupervisor, frame: SensorFrame) -> None:
-    """Hold the present joints, and let the body sink as torque is taken away."""
+def _ramp_down(robot: SafetySupervisor, data: RunData, frame: SensorFrame) -> None:
+    """Hold the last goals, and let the body sink as torque is taken away."""
+    last = data.commands[-1].joints.position if data.commands else frame.joint_position
+    # Goals that are not finite would make the supervisor hold at full torque to the end.
+    goal = np.where(np.isfinite(last), last, np.nan_to_num(frame.joint_position))
     steps = max(1, round(RAMP_DOWN / robot.period))
     for step in range(steps):
         limit = np.full(N_JOINTS, 1.0 - (step + 1) / steps)
-        robot.step(JointCommand(position=frame.joint_position, speed=np.zeros(N_JOINTS), torque_limit=limit))
+        robot.step(JointCommand(position=goal, speed=np.zeros(N_JOINTS), torque_limit=limit))
 
 
 def _safe_reason(data: RunData) -> str:

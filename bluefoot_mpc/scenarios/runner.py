@@ -104,10 +104,7 @@ def simulate(name_or_path: str, options: RunOptions) -> RunResult:
         ConfigurationError: an option, file or value is impossible.
     """
     resolved = resolve(find_scenario(name_or_path), options)
-    model = RobotModel(resolved.parameters)
-    resolved.scenario.check(model, resolved.stages.control)
-    simulator = SimRobot(model, resolved.stages.sim, resolved.run.seed)
-    table = {**resolved.table(), "drawn": simulator.drawn}
+    model, simulator, table = _prepare(resolved)
     data = _drive(
         simulator, model, resolved, resolved.scenario.source, LoopHooks(truth=simulator.truth), table
     )
@@ -133,10 +130,7 @@ def run_commanded(
         LogError: the log cannot be written.
     """
     presentation = presentation or Presentation()
-    model = RobotModel(resolved.parameters)
-    resolved.scenario.check(model, resolved.stages.control)
-    simulator = SimRobot(model, resolved.stages.sim, resolved.run.seed)
-    table = {**resolved.table(), "drawn": simulator.drawn}
+    model, simulator, table = _prepare(resolved)
     folder = _make_folder(options, resolved.run.scenario)
     with _writing(folder / CONFIG):
         (folder / CONFIG).write_text(dump_toml(table), encoding="utf-8")
@@ -151,6 +145,14 @@ def run_commanded(
         result = _judge(data, resolved, model, folder)
         _write_results(result, model, options.report)
     return result
+
+
+def _prepare(resolved: Resolved) -> tuple[RobotModel, SimRobot, dict[str, Any]]:
+    """The robot's model, the simulated robot, and everything resolved with what the seed drew."""
+    model = RobotModel(resolved.parameters)
+    resolved.scenario.check(model, resolved.stages.control)
+    simulator = SimRobot(model, resolved.stages.sim, resolved.run.seed)
+    return model, simulator, {**resolved.table(), "drawn": simulator.drawn}
 
 
 @contextmanager

@@ -105,6 +105,23 @@ def test_an_exception_in_the_controller_lowers_the_robot_and_keeps_the_log(setup
     assert robot.truth().q[2] > 0.03
 
 
+def test_what_breaks_beside_the_controller_does_not_drop_the_robot_either(setup, resolved):
+    robot, _, pipeline = setup
+
+    def full_disk(frame, output, truth):
+        if frame.time > 3.0:
+            raise OSError("no space left")
+
+    with pytest.raises(OSError, match="no space left"):
+        run(setup, pipeline, resolved.scenario.source, observers=(full_disk,))
+    torque = np.array([command.torque_limit.max() for command in robot.sent])
+    ramp = torque[np.flatnonzero(torque < 1.0)[0] :]
+    assert len(ramp) == 50
+    assert np.all(np.diff(ramp) < 0.0)
+    assert ramp[-1] == 0.0
+    assert robot.stopped == 1
+
+
 @pytest.mark.parametrize("field", ["position", "torque_limit"])
 def test_nan_from_the_controller_never_reaches_the_robot_and_ends_in_safe_mode(setup, resolved, field):
     robot, _, pipeline = setup
