@@ -17,7 +17,7 @@ PHASE_STEP = 0.235
 """s by which an event (a push, a change of gait) moves from seed to seed.
 
 The golden section of a slow trot's cycle (0.38 s): ten seeds leave no gap wider
-than 0.15 of it, nor than 0.11 of a walk's (1.3 s).
+than 0.15 of it, nor than 0.19 of a walk's (1.3 s).
 """
 
 Figures = dict[str, float | None]

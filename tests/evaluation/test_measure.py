@@ -88,3 +88,10 @@ def test_odometry_is_judged_by_mean_speeds_over_the_window():
     assert odometry_error(run) == pytest.approx(10.0, abs=1.0)
     run.truth.clear()
     assert odometry_error(run) is None
+
+
+@pytest.mark.parametrize(("cycle", "gap"), [(0.38, 0.15), (1.3, 0.19)])
+def test_ten_seeds_meet_every_part_of_the_cycle(cycle, gap):
+    phases = np.sort(PHASE_STEP * np.arange(10) / cycle % 1.0)
+    gaps = np.diff(np.append(phases, phases[0] + 1.0))
+    assert gaps.max() <= gap
