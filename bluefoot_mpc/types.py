@@ -281,6 +281,46 @@ class SafetyRequest:
     reasons: tuple[str, ...] = ()
 
 
+class Fallback(enum.IntEnum):
+    """Which rung of the ladder a plan comes from; higher is further from the optimum."""
+
+    SOLVED = 0
+    NEAREST = 1
+    SHIFTED = 2
+    STANCE = 3
+    SIT = 4
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PlanReport:
+    """What the model-based stages planned on one tick.
+
+    Attributes:
+        com: (3, 2) centre of mass in b': position (m), velocity (m/s),
+            acceleration (m/s²), horizontal; NaN without a preview.
+        margin: m, least distance of the planned ZMP to the edge of its support
+            over the horizon, + inside; NaN without a preview.
+        foot_force: (4, 3) N, planned ground forces, axes of b'; NaN without a
+            whole-body plan.
+        torque: (16,) N·m, planned joint torques; NaN without a whole-body plan.
+        preview: where the centre-of-mass plan comes from.
+        whole_body: where forces and torques come from.
+        qp_failures: problems of this tick whose solver gave no usable answer.
+        residual: N and N·m, largest error of the dynamics in the whole-body plan.
+        late: True when the previous tick missed its deadline.
+    """
+
+    com: FloatArray
+    margin: float
+    foot_force: FloatArray
+    torque: FloatArray
+    preview: Fallback = Fallback.SOLVED
+    whole_body: Fallback = Fallback.SOLVED
+    qp_failures: int = 0
+    residual: float = 0.0
+    late: bool = False
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Telemetry:
     """What the controller thought on one tick: for the log, the report and the live view.
@@ -295,6 +335,7 @@ class Telemetry:
         zmp: (2,) m, ZMP that the placement law assumes, in b'; NaN without one.
         events: what a person should know of this tick (limits met, reflexes, faults).
         tick_us: µs from the frame's arrival to the command's departure.
+        plan: what preview and whole-body stage planned; None without them.
     """
 
     time: float
@@ -306,6 +347,7 @@ class Telemetry:
     zmp: FloatArray
     events: tuple[str, ...] = ()
     tick_us: float = 0.0
+    plan: PlanReport | None = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

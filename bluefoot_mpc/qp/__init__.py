@@ -1,0 +1,1 @@
+"""Quadratic programs: problem, solution, and solvers by name."""

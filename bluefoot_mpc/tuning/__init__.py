@@ -1,0 +1,1 @@
+"""Finding parameters: what is searched, over which runs, judged by what."""
