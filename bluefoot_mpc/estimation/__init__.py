@@ -3,17 +3,22 @@
 from bluefoot_mpc.estimation.config import (
     ContactConfig,
     EstimatorConfig,
+    GroundConfig,
     HeadingConfig,
     ImuConfig,
     JointFilterConfig,
     RestConfig,
 )
 from bluefoot_mpc.estimation.estimator import Estimator
+from bluefoot_mpc.estimation.ground import GroundEstimate, GroundPlane
 
 __all__ = [
     "ContactConfig",
     "Estimator",
     "EstimatorConfig",
+    "GroundConfig",
+    "GroundEstimate",
+    "GroundPlane",
     "HeadingConfig",
     "ImuConfig",
     "JointFilterConfig",

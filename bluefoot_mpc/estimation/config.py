@@ -110,6 +110,17 @@ class RestConfig:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
+class GroundConfig:
+    """How the plane under the feet is fitted."""
+
+    memory: float = 1.0  # s, time constant with which frames are forgotten
+    min_spread: float = 0.03  # m, RMS distance of the feet from one line that makes it known
+
+    def __post_init__(self) -> None:
+        require_positive(memory=self.memory, min_spread=self.min_spread)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
 class EstimatorConfig:
     """Settings of the whole estimator."""
 
@@ -118,6 +129,7 @@ class EstimatorConfig:
     joint: JointFilterConfig = field(default_factory=JointFilterConfig)
     heading: HeadingConfig = field(default_factory=HeadingConfig)
     rest: RestConfig = field(default_factory=RestConfig)
+    ground: GroundConfig = field(default_factory=GroundConfig)
     max_step: float = 0.1  # s, a longer step between frames, or one backwards, is a jump of the clock
     initial_tilt: float = 0.05  # rad, deviation of the attitude from the first samples
     initial_speed: float = 0.05  # m/s, deviation at the start

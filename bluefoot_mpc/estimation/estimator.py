@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -11,6 +12,7 @@ from bluefoot_mpc.estimation.config import EstimatorConfig
 from bluefoot_mpc.estimation.contacts import SwitchState, advance_switches, initial_switches
 from bluefoot_mpc.estimation.corrections import Settler
 from bluefoot_mpc.estimation.filter import FilterState, initial_state
+from bluefoot_mpc.estimation.ground import GroundEstimate, GroundPlane
 from bluefoot_mpc.estimation.heading import HeadingReference, advance_heading
 from bluefoot_mpc.estimation.inertial import (
     MOTION_SIZE,
@@ -31,6 +33,11 @@ from bluefoot_mpc.types import N_LEGS, BodyState, FloatArray, SensorFrame
 BLIND_TILT = 0.3  # rad, deviation of a level start without any inertial sample
 FIRST_FRAME = 0.02  # s, samples this old belong to the first frame
 MIN_KNOWN_LEGS = 3
+_STANDING = {
+    legs: tuple(leg in legs for leg in range(N_LEGS))
+    for n in range(N_LEGS + 1)
+    for legs in itertools.combinations(range(N_LEGS), n)
+}
 
 
 class _Memory(NamedTuple):
@@ -79,11 +86,13 @@ class Estimator:
         self._settler = Settler()
         self._stance = Stance(config.contact, self._settler)
         self._odometry = Odometry(config.imu.mount)
+        self._ground = GroundPlane(config.ground)
         self._memory: _Memory | None = None
 
     def reset(self) -> None:
         """Forget everything; the next frame is the first."""
         self._memory = None
+        self._ground.reset()
 
     @property
     def gyro_bias(self) -> FloatArray:
@@ -99,6 +108,11 @@ class Estimator:
     def feet_used(self) -> tuple[int, ...]:
         """Feet that corrected the filter on the last frame."""
         return () if self._memory is None else self._memory.stance.used
+
+    @property
+    def ground(self) -> GroundEstimate:
+        """Slope of the plane under the feet that stood still, in the heading frame."""
+        return self._ground.latest
 
     def step(self, frame: SensorFrame) -> BodyState:
         """Take one frame.
@@ -138,7 +152,9 @@ class Estimator:
         self._memory = _Memory(
             frame.time, joints, switches, state, stance, heading, rest, sample, report, age
         )
-        return self._state(self._memory, known)
+        estimate = self._state(self._memory, known)
+        self._ground.step(estimate, _STANDING[stance.used], dt)
+        return estimate
 
     def _correct_heading(
         self, state: FilterState, reference: HeadingReference, frame: SensorFrame, dt: float
