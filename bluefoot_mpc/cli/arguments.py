@@ -77,7 +77,7 @@ class RunCommand(SimulationArguments):
     """Name of a scenario (see: bluefoot list), or path of a scenario script."""
     robot: Annotated[str, tyro.conf.arg(metavar="{sim}")] = "sim"
     """What to run on."""
-    controller: Annotated[str, tyro.conf.arg(metavar="{cpg}")] = "cpg"
+    controller: Annotated[str, tyro.conf.arg(metavar="{cpg,mpc}")] = "cpg"
     """What decides."""
     duration: Annotated[float | None, _Unset] = None
     """Length of the run, s."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from bluefoot_mpc.control.modes import ModeConfig
 from bluefoot_mpc.control.posture import PostureConfig
+from bluefoot_mpc.control.servo_map import ServoMapConfig
 from bluefoot_mpc.control.tracking import TrackingConfig
 from bluefoot_mpc.estimation.config import EstimatorConfig
 from bluefoot_mpc.gait.config import GaitConfig
@@ -23,4 +24,5 @@ class ControlConfig:
     ankle: AnkleConfig = field(default_factory=lambda: AnkleConfig(policy="margin"))
     zmp: PlacementConfig = field(default_factory=PlacementConfig)
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
+    servo: ServoMapConfig = field(default_factory=ServoMapConfig)
     modes: ModeConfig = field(default_factory=ModeConfig)

@@ -11,15 +11,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bluefoot_mpc.control import modes, posture, tracking
+from bluefoot_mpc.control import load_share, modes, posture, servo_map, tracking
 from bluefoot_mpc.control.command import usable
 from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.control.planned_body import PlannedBody
 from bluefoot_mpc.control.targets import JointTargets
 from bluefoot_mpc.control.trunk import TrunkPlanner
 from bluefoot_mpc.estimation.estimator import Estimator
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.gait.gait import Gait, GaitInputs
+from bluefoot_mpc.gait.gait import Gait, GaitInputs, GaitOutput
 from bluefoot_mpc.geometry import rotation_from_rpy
+from bluefoot_mpc.model.dynamics import Dynamics
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.types import (
     N_JOINTS,
@@ -28,6 +30,7 @@ from bluefoot_mpc.types import (
     JointCommand,
     Mode,
     MotionCommand,
+    PostureReference,
     SafetyRequest,
     SensorFrame,
     Telemetry,
@@ -63,6 +66,9 @@ class Pipeline:
         self._gait = Gait(config.gait, stance.feet)
         self._targets = JointTargets(geometry, config.ankle)
         self._trunk = TrunkPlanner(robot.parameters, stance, config.posture, config.zmp, self._targets.reach)
+        self._robot = robot
+        self._dynamics = Dynamics(robot)
+        self._body = PlannedBody(geometry)
         self._require_reachable()
         self.reset()
 
@@ -72,6 +78,7 @@ class Pipeline:
         self._gait.reset()
         self._trunk.reset()
         self._targets.reset()
+        self._body.reset()
         self._modes = modes.ModeState()
         self._tracking = tracking.TrackingState()
         self._wanted = MotionCommand()
@@ -100,8 +107,9 @@ class Pipeline:
         self._walking = gait.phase.walking
         reference, zmp, held = self._trunk.step(gait, motion, estimate, self._modes.sit_level, dt)
         joints, cut = self._targets.step(reference, frame, dt)
+        goals = self._fed_forward(gait, reference, joints, frame)
         command = JointCommand(
-            position=joints, speed=np.zeros(N_JOINTS), torque_limit=np.full(N_JOINTS, self._modes.torque)
+            position=goals, speed=np.zeros(N_JOINTS), torque_limit=np.full(N_JOINTS, self._modes.torque)
         )
         telemetry = Telemetry(
             time=frame.time, mode=self._modes.mode, motion=motion, estimate=estimate, phase=gait.phase,
@@ -164,6 +172,22 @@ class Pipeline:
             self._tracking, wanted, velocity[:2], heading, self.period, self.config.tracking
         )
         return twist
+
+    def _fed_forward(
+        self, gait: GaitOutput, reference: PostureReference, joints: FloatArray, frame: SensorFrame
+    ) -> FloatArray:
+        config, robot = self.config.servo, self._robot
+        self._body.step(reference, joints, self.period)
+        if config.mixing == config.back_emf == 0.0 or not self._targets.started:
+            return joints
+        share = load_share.load_ramp(gait, 0.04)
+        torque, _ = load_share.static_torques(self._dynamics, self._body.q, share)
+        torque *= servo_map.derating(frame.joint_temperature, config)
+        servo = robot.parameters.servo
+        voltage = frame.voltage if frame.voltage_valid else servo.nominal_voltage
+        goals = servo_map.goals(servo, joints, self._body.joint_speed, torque, voltage, config)
+        physical = robot.geometry
+        return np.minimum(np.maximum(goals, physical.physical_lower), physical.physical_upper)
 
     def _gait_inputs(
         self, twist: tracking.Twist, motion: MotionCommand, estimate: BodyState, upright: FloatArray

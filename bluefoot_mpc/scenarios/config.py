@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.control.presets import preset
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.io.safety import SafetyConfig
 from bluefoot_mpc.model.parameters import RobotParameters, load_parameters
@@ -77,7 +78,7 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
     table = read_toml(options.config) if options.config is not None else {}
     for override in options.overrides:
         table = merge(table, parse_override(override))
-    table = _without_run(table)
+    table = merge({"control": to_table(preset(options.controller))}, _without_run(table))
     stage_names = [f.name for f in fields(StageConfig)]
     for key, value in table.items():
         if key not in (*stage_names, "scenario", "model"):

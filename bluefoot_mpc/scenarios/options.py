@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from bluefoot_mpc.control.presets import CONTROLLERS
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 
 ROBOTS = ("sim",)
-CONTROLLERS = ("cpg",)
 RANDOMIZATIONS = ("none", "standard")
 GAITS = ("trot", "walk")
 MAX_SEED = 2**63 - 1
