@@ -307,7 +307,6 @@ class PlanReport:
         whole_body: where forces and torques come from.
         qp_failures: problems of this tick whose solver gave no usable answer.
         residual: N and N·m, largest error of the dynamics in the whole-body plan.
-        late: True when the previous tick missed its deadline.
     """
 
     com: FloatArray
@@ -318,7 +317,6 @@ class PlanReport:
     whole_body: Fallback = Fallback.SOLVED
     qp_failures: int = 0
     residual: float = 0.0
-    late: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -335,6 +333,7 @@ class Telemetry:
         zmp: (2,) m, ZMP that the placement law assumes, in b'; NaN without one.
         events: what a person should know of this tick (limits met, reflexes, faults).
         tick_us: µs from the frame's arrival to the command's departure.
+        deadline_misses: ticks so far, this one included, that took longer than the command period.
         plan: what preview and whole-body stage planned; None without them.
     """
 
@@ -347,6 +346,7 @@ class Telemetry:
     zmp: FloatArray
     events: tuple[str, ...] = ()
     tick_us: float = 0.0
+    deadline_misses: int = 0
     plan: PlanReport | None = None
 
 

@@ -16,7 +16,7 @@ _UNLOADED = 1e-6
 
 
 def load_ramp(gait: GaitOutput, ramp: float) -> FloatArray:
-    """(4,) share of its full load that each foot may carry: 0 in the air, rising and falling over `ramp` s."""
+    """(4,) share of its load that a foot may carry: 0 in the air, rising and falling over `ramp` s."""
     phase = gait.phase
     if not phase.walking:
         return np.ones(4)

@@ -31,6 +31,7 @@ from bluefoot_mpc.types import (
     MotionCommand,
     SafetyRequest,
     SensorFrame,
+    Telemetry,
     TruthSample,
 )
 
@@ -124,6 +125,7 @@ def _ticks(
     start = frame.time
     cut_short: str | None = None
     resting_since = stopping_since = float("inf")
+    misses = 0
     while True:
         now = frame.time - start
         motion: MotionCommand | None = _REST
@@ -144,7 +146,8 @@ def _ticks(
             _ramp_down(robot, data, frame)
             return f"controller error: {type(error).__name__}: {error}"
         tick_us = (time.perf_counter_ns() - tick_start) * 1e-3
-        telemetry = replace(output.telemetry, tick_us=tick_us)
+        telemetry = _timed(output.telemetry, tick_us, robot.period, misses)
+        misses = telemetry.deadline_misses
         output = ControlOutput(command=output.command, telemetry=telemetry)
         try:
             _record(data, hooks, frame, motion, safety, output)
@@ -159,6 +162,16 @@ def _ticks(
                 return _safe_reason(data)
         if cut_short is not None and (limp or now - resting_since > REST_TIMEOUT):
             return cut_short
+
+
+def _timed(telemetry: Telemetry, tick_us: float, period: float, misses: int) -> Telemetry:
+    """The tick's account with its time; a late tick is counted and said."""
+    if tick_us <= 1e6 * period:
+        return replace(telemetry, tick_us=tick_us, deadline_misses=misses)
+    late = f"late tick: {1e-3 * tick_us:.1f} ms of {1e3 * period:.0f} ms"
+    return replace(
+        telemetry, tick_us=tick_us, deadline_misses=misses + 1, events=(*telemetry.events, late)
+    )
 
 
 def _ask(source: CommandSource, now: float) -> tuple[MotionCommand | None, str | None]:

@@ -76,6 +76,7 @@ def summarize(
         "speed_ref_mps": float(np.hypot(*commands[-1].motion.velocity)) if commands else None,
         "servo_temp_max_c": _hottest(run),
         **_ticks(run),
+        **_solves(run),
         "real_time_factor": run.real_time_factor,
         "config_sha256": config_sha256(run.config),
         "versions": dict(run.versions),
@@ -151,6 +152,11 @@ def _ticks(run: RunData) -> dict[str, Any]:
         "deadline_misses": int(np.count_nonzero(ticks > 1e6 * run.period)),
         "tick_us": {"p50": float(p50), "p99": float(p99), "max": float(ticks.max())},
     }
+
+
+def _solves(run: RunData) -> dict[str, Any]:
+    plans = [telemetry.plan for telemetry in run.telemetry if telemetry.plan is not None]
+    return {"qp_failures": sum(plan.qp_failures for plan in plans) if plans else None}
 
 
 def _motion(cut: Window) -> dict[str, Any]:
