@@ -1,1 +1,1 @@
-"""Finding parameters: what is searched, over which runs, judged by what."""
+"""Finding gait parameters by simulation: what may vary, what is good, and a study that searches."""

@@ -1,0 +1,61 @@
+import pytest
+
+from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.scenarios import RunOptions
+from bluefoot_mpc.scenarios.config import resolve
+from bluefoot_mpc.scenarios.registry import find_scenario
+from bluefoot_mpc.tuning.space import SPACES, Parameter, Space, trot_space
+
+HEIGHT = Parameter(name="height", keys=("control.posture.trunk_height",), low=0.1, high=0.13)
+CYCLE = Parameter(
+    name="cycle", keys=("control.gait.trot.cycle_min", "control.gait.trot.cycle_max"), low=0.2, high=0.5
+)
+SPACE = Space(parameters=(HEIGHT, CYCLE), fixed=("control.zmp.enabled=false",))
+
+
+def test_overrides_of_a_point_set_every_key_after_the_fixed_ones():
+    assert SPACE.overrides({"cycle": 0.3, "height": 0.12}) == (
+        "control.zmp.enabled=false",
+        "control.posture.trunk_height=0.12",
+        "control.gait.trot.cycle_min=0.3",
+        "control.gait.trot.cycle_max=0.3",
+    )
+
+
+def test_values_are_cut_to_their_ranges():
+    assert SPACE.checked({"height": 0.5, "cycle": 0.0}) == {"height": 0.13, "cycle": 0.2}
+
+
+def test_unknown_and_missing_values_are_named():
+    with pytest.raises(UnknownNameError, match="hieght"):
+        SPACE.checked({"hieght": 0.1, "cycle": 0.3})
+    with pytest.raises(ConfigurationError, match="no value for cycle"):
+        SPACE.checked({"height": 0.1})
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Parameter(name="a", keys=(), low=0.0, high=1.0),
+        lambda: Parameter(name="a", keys=("a.b",), low=1.0, high=1.0),
+        lambda: Space(parameters=()),
+        lambda: Space(parameters=(HEIGHT, HEIGHT)),
+        lambda: trot_space("magic"),
+    ],
+)
+def test_impossible_spaces_are_refused(make):
+    with pytest.raises(ConfigurationError):
+        make()
+
+
+@pytest.mark.parametrize("gait", sorted(SPACES))
+@pytest.mark.parametrize("law", ["minimum_jerk", "virtual_force"])
+@pytest.mark.parametrize("corner", ["low", "high"])
+def test_shipped_spaces_name_settings_that_exist_and_stay_inside_their_limits(gait, law, corner):
+    space = SPACES[gait](law)
+    values = {p.name: getattr(p, corner) for p in space.parameters}
+    resolved = resolve(find_scenario("walk"), RunOptions(overrides=space.overrides(values)))
+    control = resolved.stages.control
+    assert control.gait.foothold.law == law
+    assert control.gait.timing(gait).cycle_min == control.gait.timing(gait).cycle_max == values["cycle"]
+    assert control.posture.stance_x == values["stance_x"]
