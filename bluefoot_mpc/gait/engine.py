@@ -8,6 +8,7 @@ from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.cpg import CpgInputs, CpgIntegrator
 from bluefoot_mpc.gait.footholds import Foot, LegClock, Stride, advance_foot
 from bluefoot_mpc.gait.network import coming_to_rest, gated
+from bluefoot_mpc.gait.parameters import Basis, Style, parameter_reader
 from bluefoot_mpc.gait.state import GaitState
 from bluefoot_mpc.gait.transition import Transition
 from bluefoot_mpc.gait.virtual_robot import VirtualPose
@@ -20,25 +21,29 @@ class GaitEngine:
 
     Args:
         config: everything that shapes the gait.
+        basis: what the tables leave empty: feet and trunk.
     """
 
-    def __init__(self, config: GaitConfig) -> None:
+    def __init__(self, config: GaitConfig, basis: Basis) -> None:
         self.config = config
         self.transition = Transition(config)
+        self.parameters = parameter_reader(
+            (config.trot_table, config.walk_table), (config.trot, config.walk), basis
+        )
         self._integrator = CpgIntegrator(config.cpg)
 
-    def rest(self, nominal: tuple[complex, ...]) -> GaitState:
-        """State of a robot that stands at the origin.
-
-        Args:
-            nominal: (4,) feet in b' as x + iy, m.
-        """
+    def rest(self) -> GaitState:
+        """State of a robot that stands at the origin, ready to trot."""
+        now = self.parameters.at(0.0, 0j, 0.0)
+        cycle = self.transition.cycle(0.0, now.shares)
         return GaitState(
-            cpg=self.transition.trot.start,
-            rhythm=self.transition.trot.rhythm,
+            cpg=cycle.start,
+            rhythm=cycle.rhythm,
             pose=VirtualPose(),
-            feet=[Foot(nominal=place, anchor=place) for place in nominal],
-            cycle=self.config.trot.cycle_max,
+            feet=[Foot(nominal=place, anchor=place, shape=now.shape) for place in now.nominal],
+            now=now,
+            style=now.style,
+            cycle=now.cycle_time,
         )
 
     def advance(self, state: GaitState, dt: float) -> Stride | None:
@@ -47,12 +52,14 @@ class GaitEngine:
         stride = None
         for _ in range(count):
             stride = self._substep(state, dt / count)
+        self._restyle(state, dt)
         return stride
 
     def _substep(self, state: GaitState, dt: float) -> Stride | None:
         if not self._start_or_rest(state):
             return None
         self._ramp(state, dt)
+        self._shift(state, dt)
         self._rhythm(state, dt)
         rhythm = state.rhythm
         self._oscillate(state, dt)
@@ -66,9 +73,11 @@ class GaitEngine:
             dt=dt,
             swing_time=rhythm.share * state.cycle,
             stance_time=(1.0 - rhythm.share) * state.cycle,
-            height=self.transition.step_height(state.place, abs(state.velocity), abs(state.yaw_rate)),
+            height=state.now.step_height,
             apex_y2=rhythm.apex,
             shift=state.reflex.shift,
+            landing=state.landing_shift,
+            shape=state.now.shape,
         )
         for leg, foot in enumerate(state.feet):
             y2 = state.cpg.y2[leg]
@@ -88,7 +97,8 @@ class GaitEngine:
         if not state.walking and moving:
             state.walking = True
             state.place = state.target
-            cycle = self.transition.cycle(state.place)
+            state.now = self.parameters.at(state.place, state.velocity, state.yaw_rate)
+            cycle = self.transition.cycle(state.place, state.now.shares)
             state.cpg, state.rhythm = cycle.start, cycle.rhythm
         return state.walking
 
@@ -105,13 +115,31 @@ class GaitEngine:
         state.landing = state.idle >= self.config.settle_cycles
 
     def _rhythm(self, state: GaitState, dt: float) -> None:
-        """Move towards the wanted gait; set rhythm and cycle time."""
-        way = self.transition
+        """Move towards the wanted gait; set rhythm, cycle time and all else that follows the speed."""
         if state.place != state.target and not state.landing:
             most = dt / max(self.config.blend_time, CYCLES_TO_CHANGE * state.cycle)
             state.place += min(most, max(-most, state.target - state.place))
-            state.rhythm = way.rhythm(state.place)
-        state.cycle = way.cycle_time(state.place, abs(state.velocity), abs(state.yaw_rate))
+        before = state.now
+        state.now = now = self.parameters.at(state.place, state.velocity, state.yaw_rate)
+        if not state.landing:
+            state.rhythm = self.transition.rhythm(state.place, now.shares)
+        state.cycle = now.cycle_time
+        if now.nominal is not before.nominal:
+            for foot, place in zip(state.feet, now.nominal, strict=True):
+                foot.nominal = place  # those in the air turn to it; those that stand go there next
+
+    def _restyle(self, state: GaitState, dt: float) -> None:
+        """Let the trunk's parameters follow the table, never in a jump."""
+        wanted, style = state.now.style, state.style
+        if wanted is not style and wanted != style:
+            keep = math.exp(-dt / self.config.style_time)
+            state.style = Style(*[b + keep * (a - b) for a, b in zip(style, wanted, strict=True)])
+
+    def _shift(self, state: GaitState, dt: float) -> None:
+        """Move the shift of the landing places towards the wanted one."""
+        change = state.wanted_shift - state.landing_shift
+        if change:
+            state.landing_shift += _limited(change, self.config.foothold.shift_rate * dt)
 
     def _oscillate(self, state: GaitState, dt: float) -> None:
         rhythm = state.rhythm

@@ -15,6 +15,7 @@ from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.cpg import CpgInputs, CpgIntegrator, CpgState
 from bluefoot_mpc.gait.gait import Gait
 from bluefoot_mpc.gait.network import gated
+from bluefoot_mpc.gait.parameters import NO_STYLE, Basis, parameter_reader
 from bluefoot_mpc.gait.state import GaitInputs
 from bluefoot_mpc.gait.transition import Transition, place_of
 from bluefoot_mpc.settings import require_positive
@@ -140,10 +141,13 @@ def footfall_pattern(gait: str, stance_feet: FloatArray, sampling: Sampling | No
 
 
 def _roll(gaits: tuple[str, str], change_at: float, sampling: Sampling, start: CpgState | None) -> CpgSeries:
-    way = Transition(sampling.config)
+    config = sampling.config
+    way = Transition(config)
+    basis = Basis(foothold=config.foothold, nominal=(0j,) * 4, style=NO_STYLE)
+    reader = parameter_reader((config.trot_table, config.walk_table), (config.trot, config.walk), basis)
     first, second = place_of(gaits[0]), place_of(gaits[1])
     integrator = CpgIntegrator(sampling.config.cpg)
-    state = start or way.cycle(first).start
+    state = start or way.cycle(first, reader.at(first, complex(sampling.speed), 0.0).shares).start
     count = round(sampling.duration / sampling.dt)
     time = np.arange(count) * np.float64(sampling.dt)
     blend = np.clip((time - change_at) / sampling.config.blend_time, 0.0, 1.0)
@@ -151,8 +155,9 @@ def _roll(gaits: tuple[str, str], change_at: float, sampling: Sampling, start: C
     for k, share in enumerate(blend.tolist()):
         y1[k], y2[k] = state.y1, state.y2
         place = first + share * (second - first)
-        rhythm = way.rhythm(place)
-        omega = rhythm.turn / way.cycle_time(place, sampling.speed, 0.0)
+        now = reader.at(place, complex(sampling.speed), 0.0)
+        rhythm = way.rhythm(place, now.shares)
+        omega = rhythm.turn / now.cycle_time
         inputs = CpgInputs(omega=omega, alpha=rhythm.alpha, matrix=rhythm.matrix)
         if gaits[0] == gaits[1]:
             state = integrator.advance(state, inputs, sampling.dt)

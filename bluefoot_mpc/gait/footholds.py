@@ -10,9 +10,10 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from bluefoot_mpc.gait.swing import lift_profile, matched_step, smooth_step, spring_transition
+from bluefoot_mpc.gait.table import Law, Vertical
 from bluefoot_mpc.gait.virtual_robot import VirtualPose, carried, point_velocity
 from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
 
@@ -21,8 +22,8 @@ from bluefoot_mpc.settings import require_nonnegative, require_positive, require
 class FootholdConfig:
     """How feet swing and where they land."""
 
-    law: Literal["virtual_force", "minimum_jerk"] = "virtual_force"  # horizontal profile
-    vertical: Literal["sine", "quintic"] = "sine"  # sine: step height follows y2, as printed
+    law: Law = "virtual_force"  # horizontal profile
+    vertical: Vertical = "sine"  # sine: step height follows y2, as printed
     stance_lead: float = 0.5  # share of the stance's travel by which feet land ahead; 0 as printed
     swing_rate: float = 9.0  # sqrt(k_c/m) times the swing time, 1
     damping_ratio: float = 1.05  # b_c / (2 sqrt(k_c m)), >= 1
@@ -36,6 +37,9 @@ class FootholdConfig:
     )
     offset_limit: float = 0.03  # largest shift of a virtual foothold after a reset, m
     offset_time: float = 0.5  # time constant of its return, s
+    shift_limit: float = 0.06  # largest shift of landing places on demand (capture point), m
+    shift_rate: float = 1.0  # fastest change of it: feet in the air follow it, m/s
+    reach: float = 0.10  # farthest that a given foothold may lie from the nominal one at landing, m
 
     def __post_init__(self) -> None:
         """Check ranges."""
@@ -46,7 +50,40 @@ class FootholdConfig:
         require_range(0.1, 0.9, apex=self.apex)
         require_range(0.0, 1.0, early_progress=self.early_progress)
         require_nonnegative(offset_limit=self.offset_limit, early_height=self.early_height)
-        require_positive(offset_time=self.offset_time)
+        require_nonnegative(shift_limit=self.shift_limit)
+        require_positive(offset_time=self.offset_time, shift_rate=self.shift_rate, reach=self.reach)
+
+
+class SwingShape(NamedTuple):
+    """How one swing goes, latched at lift-off.
+
+    Attributes:
+        law: horizontal profile.
+        vertical: vertical profile.
+        ground_matching: minimum_jerk: 1 leaves and lands at rest on the ground, 0 in b'.
+        apex: quintic: progress of the highest point.
+        swing_rate: virtual_force: sqrt(k_c/m) times the swing time.
+        stance_lead: share of the stance's travel by which the foot lands ahead.
+    """
+
+    law: Law
+    vertical: Vertical
+    ground_matching: float
+    apex: float
+    swing_rate: float
+    stance_lead: float
+
+    @staticmethod
+    def of(config: FootholdConfig) -> SwingShape:
+        """The shape that a configuration gives at every speed."""
+        return SwingShape(
+            config.law,
+            config.vertical,
+            config.ground_matching,
+            config.apex,
+            config.swing_rate,
+            config.stance_lead,
+        )
 
 
 @dataclass(kw_only=True, slots=True)
@@ -56,6 +93,7 @@ class Foot:
     Attributes:
         nominal: place under the virtual robot, x + iy, m in b'.
         anchor: place in the world while standing, m.
+        shape: how it swings, latched at lift-off.
         z: height above the ground plane now, m.
         local: place in b' while swinging, m.
         velocity: velocity in b' while swinging, m/s.
@@ -74,6 +112,7 @@ class Foot:
 
     nominal: complex
     anchor: complex
+    shape: SwingShape
     z: float = 0.0
     local: complex = 0j
     velocity: complex = 0j
@@ -112,6 +151,8 @@ class Stride(NamedTuple):
         height: step height for feet that lift now, m.
         apex_y2: y2 that counts as full height.
         shift: displacement of swinging feet by the reflex, m in b'.
+        landing: shift of the places where they land, m in b'.
+        shape: how feet that lift now swing.
     """
 
     before: VirtualPose
@@ -124,6 +165,8 @@ class Stride(NamedTuple):
     height: float
     apex_y2: float
     shift: complex
+    landing: complex
+    shape: SwingShape
 
 
 class LegClock(NamedTuple):
@@ -142,10 +185,11 @@ class LegClock(NamedTuple):
     lower: float = 1.0
 
 
-def virtual_foothold(foot: Foot, stride: Stride, config: FootholdConfig) -> complex:
-    """Where the foot should land, in b': the nominal place carried ahead, plus what a reset left."""
-    ahead = config.stance_lead * stride.stance_time
-    return carried(foot.nominal, stride.velocity, stride.yaw_rate, ahead) + foot.offset
+def virtual_foothold(foot: Foot, stride: Stride) -> complex:
+    """Where the foot should land, in b': the nominal place carried ahead, plus both shifts."""
+    ahead = foot.shape.stance_lead * stride.stance_time
+    place = carried(foot.nominal, stride.velocity, stride.yaw_rate, ahead) + foot.offset
+    return place + stride.landing if stride.landing else place
 
 
 def advance_foot(foot: Foot, clock: LegClock, stride: Stride, config: FootholdConfig) -> None:
@@ -159,14 +203,14 @@ def advance_foot(foot: Foot, clock: LegClock, stride: Stride, config: FootholdCo
     foot.turning = clock.swing
     if not foot.swinging:
         return
-    if config.law == "virtual_force":
+    if foot.shape.law == "virtual_force":
         _pull(foot, stride, config)
         if not clock.swing:
             foot.anchor = stride.after.to_world(foot.local)
     else:
-        _follow(foot, clock, stride, config)
+        _follow(foot, clock, stride)
     if clock.swing:
-        foot.z = _height(foot, clock, stride, config)
+        foot.z = _height(foot, clock, stride)
     else:
         _land(foot)
 
@@ -209,7 +253,7 @@ def freeze(
     foot.goal = None
     if estimate is None:
         return
-    shift = estimate[0] - virtual_foothold(foot, stride, config) + foot.offset
+    shift = estimate[0] - virtual_foothold(foot, stride) + foot.offset
     size = abs(shift)
     limit = config.offset_limit
     foot.offset = shift * (limit / size) if size > limit else shift
@@ -218,6 +262,7 @@ def freeze(
 
 def _lift(foot: Foot, clock: LegClock, stride: Stride) -> None:
     """Start a swing at the moment inside the step at which y2 became positive."""
+    foot.shape = stride.shape
     now = stride.after.to_local(foot.anchor)
     drift = point_velocity(now, stride.velocity, stride.yaw_rate)
     foot.start = now + drift * (clock.progress * stride.swing_time)
@@ -240,19 +285,19 @@ def _land(foot: Foot) -> None:
     foot.swinging = False
 
 
-def _goal(foot: Foot, pose: VirtualPose, stride: Stride, config: FootholdConfig) -> complex:
+def _goal(foot: Foot, pose: VirtualPose, stride: Stride) -> complex:
     if foot.goal is not None:
         return pose.to_local(foot.goal)
-    return virtual_foothold(foot, stride, config)
+    return virtual_foothold(foot, stride)
 
 
 def _pull(foot: Foot, stride: Stride, config: FootholdConfig) -> None:
     """Damped point mass, integrated exactly in the error to the foothold."""
-    after = _goal(foot, stride.after, stride, config)
+    after = _goal(foot, stride.after, stride)
     # Only a foothold that is fixed in the world moves in b'.
     before = after if foot.goal is None else stride.before.to_local(foot.goal)
     drift = (after - before) / stride.dt
-    rate = config.swing_rate / stride.swing_time
+    rate = foot.shape.swing_rate / stride.swing_time
     a, b, c, d = spring_transition(rate, config.damping_ratio, stride.dt)
     rest = -stride.shift
     if config.ground_damping and foot.goal is None:
@@ -264,9 +309,9 @@ def _pull(foot: Foot, stride: Stride, config: FootholdConfig) -> None:
     foot.velocity = drift - (c * error + d * error_rate)
 
 
-def _follow(foot: Foot, clock: LegClock, stride: Stride, config: FootholdConfig) -> None:
+def _follow(foot: Foot, clock: LegClock, stride: Stride) -> None:
     """Minimum-jerk path at the swing's progress; lands at the exact moment inside the step."""
-    goal = _goal(foot, stride.after, stride, config)
+    goal = _goal(foot, stride.after, stride)
     fixed = foot.goal is not None
     s = clock.progress if clock.swing else 1.0
     drift = point_velocity(goal, stride.velocity, stride.yaw_rate)
@@ -275,7 +320,7 @@ def _follow(foot: Foot, clock: LegClock, stride: Stride, config: FootholdConfig)
         start = stride.after.to_local(foot.anchor)
         local = matched_step(start, goal, 0j, s)
     else:
-        local = matched_step(foot.start, goal, config.ground_matching * drift * stride.swing_time, s)
+        local = matched_step(foot.start, goal, foot.shape.ground_matching * drift * stride.swing_time, s)
         if not clock.swing:
             local -= drift * (clock.progress * stride.stance_time)
     foot.velocity = (local - foot.local) / stride.dt
@@ -284,9 +329,9 @@ def _follow(foot: Foot, clock: LegClock, stride: Stride, config: FootholdConfig)
         foot.anchor = stride.after.to_world(local)
 
 
-def _height(foot: Foot, clock: LegClock, stride: Stride, config: FootholdConfig) -> float:
+def _height(foot: Foot, clock: LegClock, stride: Stride) -> float:
     goal_z = foot.goal_z if foot.goal is not None else foot.offset_z
     base = foot.start_z + (goal_z - foot.start_z) * smooth_step(clock.progress)
-    if config.vertical == "sine":
+    if foot.shape.vertical == "sine":
         return base + foot.apex * max(clock.y2, 0.0) / stride.apex_y2
-    return base + foot.apex * clock.lower * lift_profile(clock.progress, config.apex)
+    return base + foot.apex * clock.lower * lift_profile(clock.progress, foot.shape.apex)

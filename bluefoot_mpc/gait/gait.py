@@ -11,12 +11,13 @@ from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.engine import GaitEngine
 from bluefoot_mpc.gait.footholds import Stride, early_contact, freeze, virtual_foothold
+from bluefoot_mpc.gait.parameters import NO_STYLE, Basis, Style
 from bluefoot_mpc.gait.reflex import IDLE, ReflexOutput, is_quiet, reflex
 from bluefoot_mpc.gait.state import GaitInputs, GaitOutput, GaitState
 from bluefoot_mpc.gait.transition import place_of
 from bluefoot_mpc.types import BoolArray, ContactSchedule, FloatArray, GaitPhase
 
-__all__ = ["Gait", "GaitConfig", "GaitInputs", "GaitOutput"]
+__all__ = ["Gait", "GaitConfig", "GaitInputs", "GaitOutput", "Style"]
 
 
 class Gait:
@@ -26,24 +27,26 @@ class Gait:
         config: everything that shapes the gait.
         stance_feet: (4, 3) m, nominal feet in b'; their height is not used
             (feet stand on the ground plane of b').
+        style: trunk parameters where the tables have none; given back in the output.
 
     Raises:
         ConfigurationError: the feet are not four finite points, or the network
             cannot give a wanted swing share.
     """
 
-    def __init__(self, config: GaitConfig, stance_feet: FloatArray) -> None:
+    def __init__(self, config: GaitConfig, stance_feet: FloatArray, style: Style | None = None) -> None:
         feet = np.asarray(stance_feet, dtype=float)
         if feet.shape != (4, 3) or not np.all(np.isfinite(feet)):
             raise ConfigurationError(f"stance feet must be 4 finite points, not {feet.tolist()!r}")
         self.config = config
-        self._nominal = tuple(complex(x, y) for x, y, _ in feet.tolist())
-        self._engine = GaitEngine(config)
+        nominal = tuple(complex(x, y) for x, y, _ in feet.tolist())
+        basis = Basis(foothold=config.foothold, nominal=nominal, style=style or NO_STYLE)
+        self._engine = GaitEngine(config, basis)
         self.reset()
 
     def reset(self) -> None:
         """Stand at the origin with every foot at its nominal place."""
-        self.state = self._engine.rest(self._nominal)
+        self.state = self._engine.rest()
 
     def step(self, inputs: GaitInputs, dt: float) -> GaitOutput:
         """Advance by one tick.
@@ -108,7 +111,7 @@ class Gait:
         for foot, place, valid in zip(self.state.feet, places.tolist(), given, strict=True):
             if valid and all(map(math.isfinite, place)):
                 goal = self.state.pose.to_world(complex(place[0], place[1]))
-                if foot.swinging and self.config.foothold.law == "minimum_jerk":
+                if foot.swinging and foot.shape.law == "minimum_jerk":
                     foot.later = (goal, place[2])
                 else:
                     foot.goal, foot.goal_z = goal, place[2]
@@ -119,6 +122,7 @@ class Gait:
             state.wanted = state.velocity = 0j
             state.wanted_yaw_rate = state.yaw_rate = 0.0
             state.landing = state.walking
+            state.wanted_shift = 0j
             return
         forward, left = float(inputs.velocity[0]), float(inputs.velocity[1])
         if math.isfinite(forward) and math.isfinite(left):
@@ -127,6 +131,17 @@ class Gait:
         if math.isfinite(inputs.yaw_rate):
             rate = float(inputs.yaw_rate)
             state.wanted_yaw_rate = rate if abs(rate) > self.config.still_speed else 0.0
+        state.wanted_shift = self._bounded_shift(inputs.foothold_shift)
+
+    def _bounded_shift(self, wanted: FloatArray | None) -> complex:
+        """A wanted shift of landing places, cut to its bound; one that is not finite is none."""
+        if wanted is None:
+            return 0j
+        shift = complex(float(wanted[0]), float(wanted[1]))
+        size, limit = abs(shift), self.config.foothold.shift_limit
+        if not math.isfinite(size):
+            return 0j
+        return shift * (limit / size) if size > limit else shift
 
     def _reflex(
         self,
@@ -185,7 +200,7 @@ class Gait:
             return self.state.pose.to_local(foot.goal), foot.goal_z
         progress = state.rhythm.progress(state.cpg.y1[leg], state.cpg.y2[leg])[1]
         later = state.pose.moved(state.velocity, state.yaw_rate, (1.0 - progress) * stride.swing_time)
-        goal = later.to_world(virtual_foothold(foot, stride, self.config.foothold))
+        goal = later.to_world(virtual_foothold(foot, stride))
         return self.state.pose.to_local(goal), foot.offset_z
 
     def _output(self, state: GaitState) -> GaitOutput:
@@ -221,6 +236,7 @@ class Gait:
             yaw_rate=state.yaw_rate,
             cycle_time=state.cycle,
             swing_share=share,
+            style=state.style,
         )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from bluefoot_mpc.gait.calibration import Rhythm
 from bluefoot_mpc.gait.cpg import CpgState
 from bluefoot_mpc.gait.footholds import Foot
+from bluefoot_mpc.gait.parameters import NO_STYLE, Parameters, Style
 from bluefoot_mpc.gait.reflex import IDLE, ReflexOutput
 from bluefoot_mpc.gait.virtual_robot import VirtualPose
 from bluefoot_mpc.types import BoolArray, FloatArray, GaitPhase
@@ -29,6 +30,8 @@ class GaitInputs:
         tilt_rate_error: (2,) rad/s, estimated minus wanted angular velocity
             about x and y of b'.
         halt: True ends the gait at once: feet in the air land, then all rest.
+        foothold_shift: (2,) m in b', shift of the places where feet in the air
+            land (capture point); bounded, and followed at a limited speed.
     """
 
     velocity: FloatArray = field(default_factory=lambda: np.zeros(2))
@@ -39,6 +42,7 @@ class GaitInputs:
     trunk_position: FloatArray = field(default_factory=lambda: np.zeros(3))
     tilt_rate_error: FloatArray = field(default_factory=lambda: np.zeros(2))
     halt: bool = False
+    foothold_shift: FloatArray | None = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -57,6 +61,7 @@ class GaitOutput:
         yaw_rate: rad/s, after its ramp.
         cycle_time: s.
         swing_share: share of the cycle that a leg swings.
+        style: what the gait's table says about the trunk, for later stages.
     """
 
     phase: GaitPhase
@@ -68,6 +73,7 @@ class GaitOutput:
     yaw_rate: float
     cycle_time: float
     swing_share: float
+    style: Style = NO_STYLE
 
 
 @dataclass(kw_only=True, slots=True)
@@ -90,12 +96,18 @@ class GaitState:
         reflex: effect of the reflex on this tick.
         cycle: cycle time, s.
         rhythm: limit cycle in force.
+        now: parameters at the present speed.
+        style: trunk parameters, following those of `now`.
+        wanted_shift: wanted shift of landing places, m in b'.
+        landing_shift: the shift in force.
     """
 
     cpg: CpgState
     rhythm: Rhythm
     pose: VirtualPose
     feet: list[Foot]
+    now: Parameters
+    style: Style
     place: float = 0.0
     target: float = 0.0
     wanted: complex = 0j
@@ -107,6 +119,8 @@ class GaitState:
     idle: float = 0.0
     reflex: ReflexOutput = IDLE
     cycle: float = 1.0
+    wanted_shift: complex = 0j
+    landing_shift: complex = 0j
 
     def copy(self) -> GaitState:
         """An independent copy."""

@@ -93,11 +93,12 @@ def test_with_three_to_stand_on_a_hind_leg_waits_for_its_diagonal_front_leg() ->
 
 def test_the_way_shortens_swings_before_it_changes_the_order() -> None:
     way = Transition(REFERENCE)
-    middle = way.rhythm(0.5)
-    assert middle.share == pytest.approx(way.walk.rhythm.share, abs=1e-3)
-    assert middle.matrix == way.trot.rhythm.matrix
-    assert way.rhythm(0.0) is way.trot.rhythm
-    assert way.rhythm(1.0) is way.walk.rhythm
+    shares = (REFERENCE.trot.swing_share, REFERENCE.walk.swing_share)
+    middle, trot, walk = way.rhythm(0.5, shares), way.rhythm(0.0, shares), way.rhythm(1.0, shares)
+    assert middle.share == pytest.approx(walk.share, abs=1e-3)
+    assert middle.matrix == trot.matrix
+    assert trot is way.cycle(0.0, shares).rhythm
+    assert walk is way.cycle(1.0, shares).rhythm
     assert way.least_stance(0.4) == 2
     assert way.least_stance(0.6) == 3
 
