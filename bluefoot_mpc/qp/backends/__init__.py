@@ -1,0 +1,1 @@
+"""The solvers behind the one interface; nothing else names them."""
