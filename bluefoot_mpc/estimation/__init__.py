@@ -7,6 +7,7 @@ from bluefoot_mpc.estimation.config import (
     HeadingConfig,
     ImuConfig,
     JointFilterConfig,
+    LevelConfig,
     RestConfig,
 )
 from bluefoot_mpc.estimation.estimator import Estimator
@@ -22,5 +23,6 @@ __all__ = [
     "HeadingConfig",
     "ImuConfig",
     "JointFilterConfig",
+    "LevelConfig",
     "RestConfig",
 ]

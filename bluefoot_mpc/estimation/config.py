@@ -121,6 +121,33 @@ class GroundConfig:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
+class LevelConfig:
+    """When the floor counts as level, and how much that weighs."""
+
+    enabled: bool = True
+    slope: float = 0.0055  # rise per metre (0.3°) that the accelerometer's bias may feign on a level floor
+    trust: float = 0.5  # s for which the plane must have looked level
+    distrust: float = 5.0  # s after a floor that was not level, until one may be level again
+    noise: float = 0.0006  # m, deviation of two feet's heights: 0.1° between diagonal feet
+    interval: float = 0.1  # s between comparisons
+    memory: float = 3.0  # s, over which the spread of the heights is averaged
+    gate: float = 16.0  # squared deviations beyond which two feet do not stand on the same level
+    doubt: float = 0.5  # s of such feet after which the floor is no longer level
+    max_bias: float = 3.0  # deviations of the accelerometer's bias that a level floor may ask for
+
+    def __post_init__(self) -> None:
+        require_positive(
+            slope=self.slope,
+            noise=self.noise,
+            interval=self.interval,
+            memory=self.memory,
+            gate=self.gate,
+            max_bias=self.max_bias,
+        )
+        require_nonnegative(trust=self.trust, doubt=self.doubt, distrust=self.distrust)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
 class EstimatorConfig:
     """Settings of the whole estimator."""
 
@@ -130,6 +157,7 @@ class EstimatorConfig:
     heading: HeadingConfig = field(default_factory=HeadingConfig)
     rest: RestConfig = field(default_factory=RestConfig)
     ground: GroundConfig = field(default_factory=GroundConfig)
+    level: LevelConfig = field(default_factory=LevelConfig)
     max_step: float = 0.1  # s, a longer step between frames, or one backwards, is a jump of the clock
     initial_tilt: float = 0.05  # rad, deviation of the attitude from the first samples
     initial_speed: float = 0.05  # m/s, deviation at the start

@@ -23,6 +23,7 @@ from bluefoot_mpc.estimation.inertial import (
     usable_samples,
 )
 from bluefoot_mpc.estimation.joints import JointFilter, JointState, initial_joints
+from bluefoot_mpc.estimation.level import LevelFloor, LevelState
 from bluefoot_mpc.estimation.odometry import Odometry
 from bluefoot_mpc.estimation.prediction import Prediction, Predictor
 from bluefoot_mpc.estimation.rest import RestState, advance_rest, at_rest, correct_bias
@@ -49,6 +50,7 @@ class _Memory(NamedTuple):
     filter: FilterState
     stance: StanceState
     heading: HeadingReference
+    level: LevelState
     rest: RestState
     sample: Sample | None
     report: FloatArray  # (32,) what `Odometry` gave
@@ -87,6 +89,7 @@ class Estimator:
         self._stance = Stance(config.contact, self._settler)
         self._odometry = Odometry(config.imu.mount)
         self._ground = GroundPlane(config.ground)
+        self._level = LevelFloor(config.level, config.imu.accel_bias, self._settler)
         self._memory: _Memory | None = None
 
     def reset(self) -> None:
@@ -144,13 +147,16 @@ class Estimator:
         if at_rest(rest, standing, samples, state, self._config.rest):
             state = correct_bias(state, samples, self._config.rest, self._settler)
         state, heading = self._correct_heading(state, memory.heading, frame, dt)
+        level = memory.level
+        if self._config.level.enabled:
+            state, level = self._level.advance(state, level, stance.used, self._ground.latest, dt)
         report = self._odometry.advance(
             memory.position, before, state.estimate, ahead,
             used=stance.used, contact=switches.contact, rate=memory.rate, sums=motion.sums,
         )  # fmt: skip
         sample, age = (samples[-1], 0.0) if samples else (memory.sample, memory.imu_age + dt)
         self._memory = _Memory(
-            frame.time, joints, switches, state, stance, heading, rest, sample, report, age
+            frame.time, joints, switches, state, stance, heading, level, rest, sample, report, age
         )
         estimate = self._state(self._memory, known)
         self._ground.step(estimate, _STANDING[stance.used], dt)
@@ -186,8 +192,9 @@ class Estimator:
             report = self._report_at_start(state, ahead, place, switches)
         self._memory = _Memory(
             frame.time, joints, switches, state, StanceState(),
-            HeadingReference() if memory is None else memory.heading, RestState(joints.newest, 0.0),
-            samples[-1] if samples else None, report, 0.0 if memory is None else math.inf,
+            HeadingReference() if memory is None else memory.heading, LevelState(),
+            RestState(joints.newest, 0.0), samples[-1] if samples else None,
+            report, 0.0 if memory is None else math.inf,
         )  # fmt: skip
         return self._state(self._memory, known)
 
