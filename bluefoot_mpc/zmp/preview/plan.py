@@ -1,0 +1,115 @@
+"""What the preview plans."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bluefoot_mpc.types import BoolArray, Fallback, FloatArray
+from bluefoot_mpc.zmp.preview.model import advance
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ComPlan:
+    """Motion of the centre of mass over the horizon, horizontal, in the b' of now.
+
+    b' of now is kept as an inertial frame: velocities are those over the ground.
+
+    Attributes:
+        time: (n,) s from now, of the samples.
+        start: (3, 2) position (m), velocity (m/s) and acceleration (m/s²) now.
+        position: (n, 2) m.
+        velocity: (n, 2) m/s.
+        acceleration: (n, 2) m/s².
+        jerk: (n, 2) m/s³, constant up to each sample.
+        zmp: (n, 2) m.
+        margin: (n,) m, of the ZMP to the edge of the support, + inside; never
+            positive where feet stand on one line, NaN where no support is known.
+        supported: (n,) False where no foot was scheduled to stand and the region
+            of a sample beside was used.
+        slack: (3,) m, largest violation of support region, reach and terminal capture point.
+        status: where the plan comes from.
+        iterations: of the solver; 0 when no constraint was met.
+    """
+
+    time: FloatArray
+    start: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    jerk: FloatArray
+    zmp: FloatArray
+    margin: FloatArray
+    supported: BoolArray
+    slack: FloatArray
+    status: Fallback
+    iterations: int = 0
+
+    def at(self, time: float) -> FloatArray:
+        """(3, 2) position, velocity and acceleration at `time` (s from now).
+
+        Before now the start comes back, after the end the last position at rest.
+        """
+        if time <= 0.0:
+            return self.start.copy()
+        if time > self.time[-1] + 1e-9:
+            return np.stack([self.position[-1], np.zeros(2), np.zeros(2)])
+        k = min(int(np.searchsorted(self.time, time)), len(self.time) - 1)
+        if k == 0:
+            return np.array(advance(self.start, self.jerk[0], time))
+        before = (self.position[k - 1], self.velocity[k - 1], self.acceleration[k - 1])
+        return np.array(advance(before, self.jerk[k], time - float(self.time[k - 1])))
+
+    @property
+    def least_margin(self) -> float:
+        """M, least margin over the horizon; NaN when none is known."""
+        known = self.margin[np.isfinite(self.margin)]
+        return float(known.min()) if len(known) else float("nan")
+
+
+def carried(points: FloatArray, pose: FloatArray, now: FloatArray) -> FloatArray:
+    """(3, 2) position, velocity and acceleration in another frame.
+
+    Args:
+        points: (3, 2) in the frame at `pose`.
+        pose: (3,) x (m), y (m), yaw (rad) of that frame.
+        now: (3,) of the wanted frame.
+    """
+    turn, offset = _change(pose, now)
+    state = points @ turn.T
+    state[0] += offset
+    return state
+
+
+def shifted(plan: ComPlan, age: float, pose: FloatArray, now: FloatArray) -> ComPlan:
+    """The plan as it looks `age` s after it was made, from the frame of now; at rest past its end.
+
+    Args:
+        plan: in the frame at `pose`.
+        age: s.
+        pose: (3,) x (m), y (m), yaw (rad) of that frame.
+        now: (3,) of the wanted frame.
+    """
+    turn, offset = _change(pose, now)
+    states = np.array([plan.at(age + time) for time in (0.0, *plan.time.tolist())]) @ turn.T
+    states[:, 0] += offset
+    sample = np.minimum(np.searchsorted(plan.time, age + plan.time - 1e-9), len(plan.time) - 1)
+    past = (age + plan.time > plan.time[-1] + 1e-9)[:, None]
+    return ComPlan(
+        time=plan.time, start=states[0], position=states[1:, 0], velocity=states[1:, 1],
+        acceleration=states[1:, 2], jerk=np.where(past, 0.0, plan.jerk[sample] @ turn.T),
+        zmp=np.where(past, states[1:, 0], plan.zmp[sample] @ turn.T + offset),
+        margin=plan.margin[sample], supported=plan.supported[sample], slack=plan.slack,
+        status=Fallback.SHIFTED,
+    )  # fmt: skip
+
+
+def _change(pose: FloatArray, now: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(2, 2) turn and (2,) offset (m) that take points of the frame at `pose` to that at `now`."""
+    (x, y, yaw), (x_now, y_now, yaw_now) = pose.tolist(), now.tolist()
+    c, s = math.cos(yaw - yaw_now), math.sin(yaw - yaw_now)
+    c_now, s_now = math.cos(yaw_now), math.sin(yaw_now)
+    dx, dy = x - x_now, y - y_now
+    return np.array([[c, -s], [s, c]]), np.array([c_now * dx + s_now * dy, c_now * dy - s_now * dx])
