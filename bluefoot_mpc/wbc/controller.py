@@ -1,0 +1,175 @@
+"""The whole-body controller: owns the memory, solves, checks, and never answers with garbage."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from bluefoot_mpc.codegen import CodegenConfig, compiled
+from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.qp import QpStatus, Solver, SolverOptions, make_solver
+from bluefoot_mpc.types import BoolArray, Fallback, FloatArray
+from bluefoot_mpc.wbc.assembly import Assembly, Buffers, Stance
+from bluefoot_mpc.wbc.config import WholeBodyConfig
+from bluefoot_mpc.wbc.constraints.unilateral import ForceRamp
+from bluefoot_mpc.wbc.inputs import WholeBodyInputs, WholeBodyPlan
+from bluefoot_mpc.wbc.ladder import into_limits, nearest_point, static_forces, static_torque
+from bluefoot_mpc.wbc.model import WholeBodyModel
+from bluefoot_mpc.wbc.problem import ACCELERATION_UNIT, check_function, force_unit
+
+_RESIDUAL = 1e-6  # of the weight: a plan that misses the dynamics by more is not used
+_AT_LIMIT = 1e-5  # N·m
+_NO_FOOT = "no foot stands: the plan has no ground force"
+_NOT_FINITE = "state or references are not finite"
+
+
+class WholeBodyController:
+    """Joint accelerations, ground forces and torques for one tick after the other.
+
+    Args:
+        model: the robot.
+        config: weights, gains, limits, solver.
+
+    Raises:
+        ConfigurationError: the solver's name is unknown.
+    """
+
+    def __init__(self, model: WholeBodyModel, config: WholeBodyConfig | None = None) -> None:
+        self.model, self.config = model, config or WholeBodyConfig()
+        self._assembly = Assembly(model, self.config)
+        sizes = [stance.problem.size for stance in self._assembly.stances]
+        self._solvers: list[Solver] = [
+            make_solver(self.config.solver, size, SolverOptions(warm_start=False)) for size in sizes
+        ]
+        limit = self.config.force_limit * model.weight
+        self._ramp = ForceRamp(len(model.feet), limit, self.config.force_ramp, model.weight)
+        self._check = _Check(model, self._assembly)
+        self.reset()
+
+    def reset(self) -> None:
+        """The state after init: no plan before, every foot carries fully."""
+        self._ramp.reset()
+        for solver in self._solvers:
+            solver.reset()
+        self._previous: WholeBodyPlan | None = None
+        self._known = self.model.posture
+        self._without = 0.0  # s without a plan of its own
+
+    def step(self, inputs: WholeBodyInputs, dt: float) -> WholeBodyPlan:
+        """The plan of this tick.
+
+        Args:
+            inputs: state and references.
+            dt: s since the last tick, and until the next.
+
+        Raises:
+            ConfigurationError: an input has not the length that this robot needs.
+        """
+        contact = np.asarray(inputs.contact, dtype=np.bool_)
+        caps = self._ramp.step(contact, inputs.remaining, dt)
+        try:
+            finite = self._assembly.fill(inputs, caps, dt)
+        except ValueError as error:
+            raise ConfigurationError(f"whole-body inputs do not fit the robot: {error}") from error
+        if not finite:
+            return self._substitute(contact, _NOT_FINITE, dt)
+        self._known = inputs.q
+        stance = self._assembly.assemble(contact)
+        solution = self._solvers[int(np.count_nonzero(contact))].solve(stance.problem)
+        if solution.status is QpStatus.SOLVED:
+            plan = self._plan(stance, solution.x, contact, solution.iterations)
+            if plan.residual <= _RESIDUAL * self.model.weight:
+                return self._kept(plan)
+        return self._nearest(stance, contact, f"{self.config.solver}: {solution.status}", dt)
+
+    def _kept(self, plan: WholeBodyPlan) -> WholeBodyPlan:
+        self._previous, self._without = plan, 0.0
+        return plan
+
+    def _plan(self, stance: Stance, x: FloatArray, contact: BoolArray, iterations: int) -> WholeBodyPlan:
+        """The plan that x means, with torques from inverse dynamics."""
+        check, joints = self._check, self.model.joints
+        made = stance.plan @ x
+        np.add(made[:6], self._assembly.base, out=check.acceleration[:6])
+        np.multiply(x[:joints], ACCELERATION_UNIT, out=check.acceleration[6:])
+        check.force.fill(0.0)
+        check.force[contact] = (force_unit(self.model) * x[joints:]).reshape(-1, 3)
+        check.call()
+        problem, torque = stance.problem, made[6:]
+        margin = np.minimum(problem.upper[:joints] - torque, torque - problem.lower[:joints])
+        return WholeBodyPlan(
+            acceleration=check.acceleration.copy(), foot_force=check.force_in_world.copy(),
+            torque=check.torque.copy(), com_acceleration=check.com.copy(),
+            foot_acceleration=check.feet.copy(), status=Fallback.SOLVED,
+            residual=float(np.abs(check.residual).max()), iterations=iterations,
+            saturated=margin < _AT_LIMIT, reason="" if contact.any() else _NO_FOOT,
+        )  # fmt: skip
+
+    def _nearest(self, stance: Stance, contact: BoolArray, cause: str, dt: float) -> WholeBodyPlan:
+        """The same problem with its limits as penalties; torques are then cut to the envelope."""
+        x = nearest_point(stance.problem)
+        if x is None:
+            return self._substitute(contact, f"{cause}, and no nearest point", dt)
+        x = into_limits(self.model, stance.problem, x, self.config.friction)
+        plan = self._plan(stance, x, contact, 0)
+        if not plan.residual <= _RESIDUAL * self.model.weight:  # NaN too
+            return self._substitute(contact, f"{cause}, and a nearest point that breaks the dynamics", dt)
+        lowest, highest = self._envelope()
+        torque = np.clip(plan.torque, lowest, highest)
+        lacking = float(np.abs(torque - plan.torque).max())
+        plan = dataclasses.replace(
+            plan, torque=torque, status=Fallback.NEAREST, residual=max(plan.residual, lacking),
+            saturated=(torque <= lowest) | (torque >= highest), reason=f"nearest point: {cause}",
+        )  # fmt: skip
+        return self._kept(plan)
+
+    def _substitute(self, contact: BoolArray, cause: str, dt: float) -> WholeBodyPlan:
+        """A plan that does not come from this tick: the previous one, then the static stance."""
+        self._without += dt
+        late = self._without - self.config.shift_time
+        if self._previous is not None and late <= 0.0:
+            forces = np.where(contact[:, None], self._previous.foot_force, 0.0)
+            return dataclasses.replace(
+                self._previous, foot_force=forces, status=Fallback.SHIFTED, residual=np.inf, iterations=0,
+                reason=f"previous plan: {cause}",
+            )  # fmt: skip
+        sit = late > self.config.stance_time
+        return self._static(contact, Fallback.SIT if sit else Fallback.STANCE, cause)
+
+    def _static(self, contact: BoolArray, status: Fallback, cause: str) -> WholeBodyPlan:
+        model, feet = self.model, len(self.model.feet)
+        forces = static_forces(model, self._known, contact)
+        torque = static_torque(model, self._known, forces)
+        limit = self.config.torque_share * model.actuators.torque
+        held = np.clip(torque, -limit, limit)
+        wish = "asks to sit down" if status is Fallback.SIT else "static stance"
+        return WholeBodyPlan(
+            acceleration=np.zeros(model.pin_model.nv), foot_force=forces, torque=held,
+            com_acceleration=np.zeros(3), foot_acceleration=np.zeros((feet, 3)), status=status,
+            residual=np.inf, iterations=0, saturated=np.abs(torque) >= limit, reason=f"{wish}: {cause}",
+        )  # fmt: skip
+
+    def _envelope(self) -> tuple[FloatArray, FloatArray]:
+        """(nj,) lowest and highest torque of this tick, N·m; never past zero, so that zero always fits."""
+        given, actuators = self._assembly.given, self.model.actuators
+        stall = given.strength[0] * given.torque
+        lost = actuators.back_emf * given.v[6:]
+        return np.minimum(-stall - lost, 0.0), np.maximum(stall - lost, 0.0)
+
+
+class _Check:
+    """Inverse dynamics of a plan, in arrays that are made once."""
+
+    def __init__(self, model: WholeBodyModel, assembly: Assembly) -> None:
+        feet, velocities = len(model.feet), model.pin_model.nv
+        self.acceleration, self.force = np.zeros(velocities), np.zeros((feet, 3))
+        self.torque, self.residual = np.zeros(model.joints), np.zeros(6)
+        self.force_in_world, self.com, self.feet = np.zeros((feet, 3)), np.zeros(3), np.zeros((feet, 3))
+        given = assembly.given
+        function: Any = compiled(check_function(model), CodegenConfig(enabled=assembly.codegen))
+        inputs = [given.q, given.v, given.ground, self.acceleration, self.force]
+        outputs = [self.torque, self.residual, self.force_in_world, self.com, self.feet]
+        self._function = Buffers(function, inputs, outputs)
+        self.call = self._function.call
