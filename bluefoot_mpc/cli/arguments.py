@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import tyro
 
+from bluefoot_mpc.control.presets import DEFAULT_CONTROLLER
 from bluefoot_mpc.exceptions import ConfigurationError
 
 MAX_STATES = 1_000_000
@@ -77,7 +78,9 @@ class RunCommand(SimulationArguments):
     """Name of a scenario (see: bluefoot list), or path of a scenario script."""
     robot: Annotated[str, tyro.conf.arg(metavar="{sim}")] = "sim"
     """What to run on."""
-    controller: Annotated[str, tyro.conf.arg(metavar="{cpg,mpc}")] = "cpg"
+    controller: Annotated[
+        str | None, tyro.conf.arg(metavar="{cpg,mpc}", help_behavior_hint=f"(default: {DEFAULT_CONTROLLER})")
+    ] = None
     """What decides."""
     duration: Annotated[float | None, _Unset] = None
     """Length of the run, s."""

@@ -8,6 +8,8 @@ from bluefoot_mpc.exceptions import UnknownNameError
 
 CONTROLLERS = ("cpg", "mpc")
 """``cpg``: the paper's laws. ``mpc``: preview and whole-body control beside them."""
+DEFAULT_CONTROLLER = "cpg"
+"""What runs where nobody chooses."""
 
 
 def preset(name: str) -> ControlConfig:

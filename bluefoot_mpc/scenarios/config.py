@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from bluefoot_mpc.control.config import ControlConfig
-from bluefoot_mpc.control.presets import preset
+from bluefoot_mpc.control.presets import CONTROLLERS, DEFAULT_CONTROLLER, preset
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.io.safety import SafetyConfig
 from bluefoot_mpc.model.parameters import RobotParameters, load_parameters
@@ -31,7 +31,7 @@ class RunSection:
     scenario: str
     seed: int = 0
     robot: str = "sim"
-    controller: str = "cpg"
+    controller: str = DEFAULT_CONTROLLER
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -78,7 +78,8 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
     table = read_toml(options.config) if options.config is not None else {}
     for override in options.overrides:
         table = merge(table, parse_override(override))
-    table = merge({"control": to_table(preset(options.controller))}, _without_run(table))
+    controller = _controller(table, options)
+    table = merge({"control": to_table(preset(controller))}, _without_run(table))
     stage_names = [f.name for f in fields(StageConfig)]
     for key, value in table.items():
         if key not in (*stage_names, "scenario", "model"):
@@ -92,12 +93,26 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
     made.world = sim.world
     return Resolved(
         run=RunSection(
-            scenario=scenario.name, seed=options.seed, robot=options.robot, controller=options.controller
+            scenario=scenario.name, seed=options.seed, robot=options.robot, controller=controller
         ),
         scenario=made,
         stages=StageConfig(sim=made.prepare(sim), safety=stages.safety, control=stages.control),
         parameters=_parameters(table, options),
     )
+
+
+def _controller(table: dict[str, Any], options: RunOptions) -> str:
+    """The controller that is asked for, or the one whose configuration the file holds."""
+    run = table.get("run", {})
+    named = run.get("controller") if isinstance(run, Mapping) else None
+    if named is not None and named not in CONTROLLERS:
+        raise UnknownNameError("controller", str(named), CONTROLLERS)
+    if None not in (named, options.controller) and named != options.controller and "control" in table:
+        raise ConfigurationError(
+            f"{options.config} holds the configuration of the controller '{named}': "
+            f"leave --controller {options.controller} out, or take a file without [control]"
+        )
+    return options.controller or named or DEFAULT_CONTROLLER
 
 
 def _without_run(table: dict[str, Any]) -> dict[str, Any]:

@@ -26,7 +26,7 @@ class RunOptions:
     """
 
     robot: str = "sim"
-    controller: str = "cpg"
+    controller: str | None = None  # None: what the configuration file says, or the default
     model: str | None = None  # parameter file, or the name of one that ships
     seed: int = 0
     duration: float | None = None  # s
@@ -50,7 +50,8 @@ class RunOptions:
 
     def __post_init__(self) -> None:
         _require_choice("robot", self.robot, ROBOTS)
-        _require_choice("controller", self.controller, CONTROLLERS)
+        if self.controller is not None:
+            _require_choice("controller", self.controller, CONTROLLERS)
         _require_choice("randomization", self.randomize, RANDOMIZATIONS)
         if self.gait is not None:
             _require_choice("gait", self.gait, GAITS)

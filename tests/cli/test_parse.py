@@ -115,7 +115,7 @@ def test_wrong_use_is_one_message_that_names_what_is_valid(words, named):
     ("words", "named"),
     [
         (["--robot", "emulator"], ["emulator", "sim"]),
-        (["--controller", "mpc"], ["mpc", "cpg"]),
+        (["--controller", "lqr"], ["lqr", "mpc", "cpg"]),
         (["--randomize", "lots"], ["lots", "none", "standard"]),
         (["--gait", "canter"], ["canter", "trot", "walk"]),
         (["--duration", "-3"], ["--duration", "-3"]),

@@ -87,7 +87,7 @@ def test_a_bad_override_names_value_and_choices(override, message):
         ({"speed": float("inf")}, "--speed"),
         ({"gait": "gallop"}, "unknown gait 'gallop'.*trot, walk"),
         ({"robot": "hardware"}, "unknown robot 'hardware'.*sim"),
-        ({"controller": "mpc"}, "unknown controller 'mpc'.*cpg"),
+        ({"controller": "lqr"}, "unknown controller 'lqr'.*cpg"),
         ({"randomize": "wild"}, "unknown randomization"),
         ({"friction": 0.0}, "--friction"),
         ({"seed": -1}, "--seed"),
