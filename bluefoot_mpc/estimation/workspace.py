@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from bluefoot_mpc.codegen import compiled
 from bluefoot_mpc.types import FloatArray
 
 
@@ -41,14 +42,15 @@ def _array(size: tuple[int, int]) -> FloatArray:
 
 
 def compile_function(name: str, inputs: Mapping[str, Any], outputs: Mapping[str, Any]) -> Any:
-    """A dense CasADi function for its virtual machine, with repeated parts computed once.
+    """A dense CasADi function as machine code where it can be built, with repeated parts computed once.
 
     Args:
         name: of the function.
         inputs: names and symbols.
         outputs: names and expressions.
     """
-    return ca.Function(
+    function = ca.Function(
         name, list(inputs.values()), [ca.densify(value) for value in outputs.values()],
         list(inputs), list(outputs), {"cse": True},
     )  # fmt: skip
+    return compiled(function)
