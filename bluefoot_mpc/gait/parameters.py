@@ -20,6 +20,8 @@ class Style(NamedTuple):
         ankle_shift: rad, added to the ankle direction.
         level_gain: 1/s, slow integral levelling.
         rate_damping: gain of the trunk's rate damping, in its law's own unit.
+        mixing: share of the planned torque that the goals feed forward.
+        back_emf: share of what back-EMF takes at the planned speed.
     """
 
     trunk_height: float = math.nan
@@ -27,6 +29,8 @@ class Style(NamedTuple):
     ankle_shift: float = 0.0
     level_gain: float = 0.0
     rate_damping: float = 0.0
+    mixing: float = 0.0
+    back_emf: float = 0.0
 
 
 class Parameters(NamedTuple):

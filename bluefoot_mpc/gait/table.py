@@ -30,6 +30,8 @@ BOUNDS = {
     "ankle_shift": (-1.5, 1.5),
     "level_gain": (0.0, 100.0),
     "rate_damping": (-100.0, 100.0),
+    "mixing": (0.0, 1.0),
+    "back_emf": (0.0, 1.5),
 }
 NAMES = ("law", "vertical")  # columns of words: the nearest knot's holds, from the next lift-off on
 
@@ -61,6 +63,8 @@ class GaitTable:
     ankle_shift: tuple[float, ...] = ()  # rad, added to the ankle direction
     level_gain: tuple[float, ...] = ()  # 1/s, slow integral levelling
     rate_damping: tuple[float, ...] = ()  # gain of the trunk's rate damping, in its law's own unit
+    mixing: tuple[float, ...] = ()  # share of the planned torque that the goals feed forward, 1
+    back_emf: tuple[float, ...] = ()  # the same of what back-EMF takes, 1
     turn_lever: float = 0.15  # m, effective speed per yaw rate
     lateral_weight: float = 1.0  # how much sideways speed counts in the effective speed, 1
 
