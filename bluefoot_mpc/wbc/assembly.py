@@ -6,163 +6,203 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from bluefoot_mpc.codegen import CodegenConfig, compiled
-from bluefoot_mpc.qp.problem import QpProblem, QpSize
+from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.qp import QpProblem
 from bluefoot_mpc.types import BoolArray, FloatArray
+from bluefoot_mpc.wbc.buffers import Buffers
 from bluefoot_mpc.wbc.config import WholeBodyConfig
 from bluefoot_mpc.wbc.constraints.friction import SIDES, friction_rows
 from bluefoot_mpc.wbc.inputs import WholeBodyInputs
-from bluefoot_mpc.wbc.layout import parameter_layout
+from bluefoot_mpc.wbc.layout import input_sizes, parameter_layout
 from bluefoot_mpc.wbc.model import WholeBodyModel
-from bluefoot_mpc.wbc.problem import ACCELERATION_UNIT, assembly_function, force_unit, task_count
+from bluefoot_mpc.wbc.problem import BASE, assembly_function, plan_function, plan_layout, task_count
 
-_UP = np.array([0.0, 0.0, 1.0])
-
-
-class Buffers:
-    """A CasADi function on numpy arrays that it reads and writes in place, without copies.
-
-    `call` is only good as long as this object lives.
-
-    Args:
-        function: dense function.
-        inputs: one array per input, in its order; columns first where it is a matrix.
-        outputs: likewise.
-    """
-
-    def __init__(self, function: ca.Function, inputs: list[FloatArray], outputs: list[FloatArray]) -> None:
-        self._kept = (function, inputs, outputs)
-        pair: Any = function.buffer()  # CasADi's annotations ask for the size that a memoryview carries
-        self._buffer, self.call = pair
-        for index, array in enumerate(inputs):
-            self._buffer.set_arg(index, array.reshape(-1).data)
-        for index, array in enumerate(outputs):
-            self._buffer.set_res(index, array.reshape(-1).data)
+_NO_LIMIT = 1e9  # finite stand-in for "unlimited"
+_NEVER = 1e3  # s, until a lift-off that is not scheduled
+_LEAST_RAMP = 1e-6  # s, stands for no ramp at all
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Stance:
-    """The problem of one number of standing feet, and the parts it was built from.
+    """The problem of one set of standing feet; views and arrays that live as long as it does.
 
     Attributes:
         problem: what the solver gets.
-        rows: (t + 6 + nj, n) tasks, base acceleration, torque; per unit of x.
+        feet: number of standing feet.
+        columns: (n,) which unknowns of all feet these are; None: all.
+        rows: (t + 6 + nj, n) tasks, base acceleration, torque, per unit of x.
         bounds: (4, n) diagonal cost, linear cost, lower and upper bound.
-        tasks: (t, n) view: the least squares' matrix.
-        plan: (6 + nj, n) view: base acceleration and torque.
-        torque: (nj, n) view.
+        tasks: view: the least squares' matrix.
+        base: view: base acceleration.
+        diagonal: view of the problem's cost.
     """
 
     problem: QpProblem
+    feet: int
+    columns: Any
     rows: FloatArray
     bounds: FloatArray
     tasks: FloatArray
-    plan: FloatArray
-    torque: FloatArray
+    base: FloatArray
+    diagonal: FloatArray
 
 
 class Assembly:
-    """Fills the problem of a tick.
+    """Fills the problem of a tick and reads its answer.
 
     Attributes:
-        parameters: (p,) flat parameters; write through `given`.
+        parameters: (p,) flat parameters.
         given: named views of them.
-        base: (6,) base acceleration at x = 0.
-        stances: problems by number of standing feet.
-        codegen: whether functions are built from C.
+        flat_plan: (m,) the plan of the last answer.
+        plan: named views of it (`problem.plan_layout`).
     """
 
     def __init__(self, model: WholeBodyModel, config: WholeBodyConfig) -> None:
         self._model, self._config = model, config
-        self.codegen = config.codegen
-        layout = parameter_layout(model)
-        self.parameters = np.zeros(layout.size)
-        self.given: Any = layout.views(self.parameters)
-        self._tasks, joints, feet = task_count(model), model.joints, len(model.feet)
-        self._full = joints + 3 * feet
-        self._rows = np.zeros((self._tasks + 6 + joints, self._full))
-        self._bounds = np.zeros((4, self._full))
-        self._side, self.base = np.zeros(self._tasks), np.zeros(6)
-        self._lower, self._upper = np.zeros(joints), np.zeros(joints)
-        function = compiled(assembly_function(model), CodegenConfig(enabled=config.codegen))
-        outputs = [self._rows, self._side, self.base, self._lower, self._upper, self._bounds]
-        self._function = Buffers(function, [self.parameters], outputs)
-        self._call = self._function.call
-        self.stances = tuple(self._stance(count) for count in range(feet + 1))
-        self._columns: dict[bytes, Any] = {}
+        layout, answer = parameter_layout(model), plan_layout(model)
+        self.parameters, self.flat_plan = np.zeros(layout.size), np.zeros(answer.size)
+        self.given: Any = layout.cut(self.parameters)
+        self.plan: Any = answer.cut(self.flat_plan)
+        sizes = input_sizes(model)
+        self._inputs = layout.part(self.parameters, tuple(sizes))
+        self._default = {name: np.zeros(size) for name, size in sizes.items()}
+        self._default["remaining"].fill(_NEVER)
+        self._default["ground"][2] = 1.0
+        self._allocate()
         self._configure()
-        self._rest = self.parameters.copy()
+        build, every = CodegenConfig(enabled=config.codegen), np.ones(len(model.feet), dtype=np.bool_)
+        self._stances = {every.tobytes(): self._new_stance(every)}
+        outputs = [
+            self._rows[: self._written], self._side, self._base, self._lower[: model.joints],
+            self._upper[: model.joints], self._bounds, self._loaded,
+        ]  # fmt: skip
+        self._assemble = Buffers(compiled(assembly_function(model), build), [self.parameters], outputs)
+        inputs = [self.parameters, self._x, self._acceleration]
+        self._evaluate = Buffers(compiled(plan_function(model), build), inputs, [self.flat_plan])
+        self.reset()
 
-    def fill(self, inputs: WholeBodyInputs, caps: FloatArray, dt: float) -> bool:
+    def reset(self) -> None:
+        """Every foot carries fully."""
+        self._loaded.fill(1.0)
+
+    def fill(self, inputs: WholeBodyInputs, dt: float) -> bool:
         """Take the state and references of a tick; False where a number of them is not finite.
 
         Args:
             inputs: of the tick.
-            caps: (k,) N, largest normal forces.
             dt: s, of the tick.
 
         Raises:
-            ValueError: an array has not the length of this robot.
+            ConfigurationError: an array has not the length of this robot.
         """
-        given = self.given
-        np.copyto(self.parameters, self._rest)
-        given.q[:], given.v[:] = inputs.q, inputs.v
-        given.contact[:], given.force_cap[:] = inputs.contact, caps
-        given.com[:], given.trunk[:], given.foot[:] = inputs.com, inputs.trunk, inputs.foot.reshape(-1)
-        given.posture[:] = inputs.q[7:] if inputs.posture is None else inputs.posture
-        for name in _OPTIONAL:
-            value = getattr(inputs, name)
-            if value is not None:
-                getattr(given, name)[:] = value.reshape(-1)
-        voltage = inputs.voltage
+        parts = self._parts(inputs)
+        try:
+            np.concatenate(parts, out=self._inputs)
+        except ValueError as error:
+            raise ConfigurationError(self._misfit(parts)) from error
+        given, voltage = self.given, inputs.voltage
         share = 1.0 if voltage is None else voltage / self._model.actuators.nominal_voltage
-        given.strength[0] = self._config.torque_share * share * inputs.derating
+        given.strength[0] = strength = self._config.torque_share * share * inputs.derating
         given.horizon[0] = self._config.limit_horizon * dt
+        given.dt[0] = dt
+        given.loaded[:] = self._loaded
         # One product finds every NaN and inf; a number too large to square is as useless.
-        return math.isfinite(self._finite @ self._finite)
+        return math.isfinite(self._inputs.dot(self._inputs) + strength + dt)
 
     def assemble(self, contact: BoolArray) -> Stance:
         """Evaluate the functions and fill the problem of the feet that stand."""
-        self._call()
-        stance = self.stances[int(np.count_nonzero(contact))]
-        if stance.rows is not self._rows:
-            columns = self._chosen(contact)
-            np.take(self._rows, columns, axis=1, out=stance.rows, mode="clip")
-            np.take(self._bounds, columns, axis=1, out=stance.bounds, mode="clip")
-        problem, joints = stance.problem, self._model.joints
-        np.matmul(stance.tasks.T, stance.tasks, out=problem.hessian)
-        problem.hessian.reshape(-1)[:: problem.hessian.shape[0] + 1] += stance.bounds[0]
-        np.matmul(self._side, stance.tasks, out=problem.gradient)
-        np.subtract(stance.bounds[1], problem.gradient, out=problem.gradient)
-        problem.matrix[:joints] = stance.torque
-        problem.lower[:joints] = self._lower
-        problem.upper[:joints] = self._upper
+        self._assemble.call()
+        stance = self.stance(contact)
+        if stance.columns is not None:
+            self._rows[: self._written].take(stance.columns, axis=1, out=stance.rows, mode="clip")
+            self._bounds.take(stance.columns, axis=1, out=stance.bounds, mode="clip")
+        hessian, gradient = stance.problem.hessian, stance.problem.gradient
+        # The copy keeps numpy off its slower path for a matrix times its own transpose.
+        np.dot(stance.tasks.T, stance.tasks.copy(), out=hessian)
+        np.add(stance.diagonal, stance.bounds[0], out=stance.diagonal)
+        np.dot(self._side, stance.tasks, out=gradient)
+        np.add(gradient, stance.bounds[1], out=gradient)
         return stance
 
-    def _chosen(self, contact: BoolArray) -> Any:
-        """Indices of the unknowns that the standing feet leave."""
+    def stance(self, contact: BoolArray) -> Stance:
+        """Where the problem of these standing feet is kept."""
         key = contact.tobytes()
-        columns = self._columns.get(key)
-        if columns is None:
-            kept = np.concatenate([np.ones(self._model.joints, dtype=bool), np.repeat(contact, 3)])
-            columns = self._columns[key] = np.flatnonzero(kept)
-        return columns
+        stance = self._stances.get(key)
+        if stance is None:
+            stance = self._stances[key] = self._new_stance(contact)
+        return stance
 
-    def _stance(self, count: int) -> Stance:
-        joints, whole = self._model.joints, count == len(self._model.feet)
-        size = joints + 3 * count
-        rows = self._rows if whole else np.zeros((len(self._rows), size))
+    def evaluate(self, stance: Stance, x: FloatArray) -> None:
+        """Write the plan that an answer means to `plan`."""
+        acceleration = self._acceleration
+        np.dot(stance.base, x, out=acceleration)
+        np.add(acceleration, self._base, out=acceleration)
+        if stance.columns is None:
+            self._x[:] = x
+        else:
+            self._x.fill(0.0)
+            self._x[stance.columns] = x
+        self._evaluate.call()
+
+    def _parts(self, i: WholeBodyInputs) -> list[Any]:
+        """The caller's arrays in the order of the parameters, flat, with what was left out."""
+        d = self._default
+        return [
+            i.q, i.v, i.contact, i.com,
+            d["com_velocity"] if i.com_velocity is None else i.com_velocity,
+            d["com_acceleration"] if i.com_acceleration is None else i.com_acceleration,
+            i.trunk,
+            d["trunk_velocity"] if i.trunk_velocity is None else i.trunk_velocity,
+            d["trunk_acceleration"] if i.trunk_acceleration is None else i.trunk_acceleration,
+            i.foot.reshape(-1),
+            d["foot_velocity"] if i.foot_velocity is None else i.foot_velocity.reshape(-1),
+            d["foot_acceleration"] if i.foot_acceleration is None else i.foot_acceleration.reshape(-1),
+            i.q[7:] if i.posture is None else i.posture,
+            d["posture_velocity"] if i.posture_velocity is None else i.posture_velocity,
+            d["posture_acceleration"] if i.posture_acceleration is None else i.posture_acceleration,
+            d["remaining"] if i.remaining is None else i.remaining,
+            d["ground"] if i.ground is None else i.ground,
+        ]  # fmt: skip
+
+    def _misfit(self, parts: list[Any]) -> str:
+        pairs = zip(self._default.items(), parts, strict=True)
+        wrong = [
+            f"{name} has {np.size(part)} values, not {len(d)}"
+            for (name, d), part in pairs
+            if np.size(part) != len(d)
+        ]
+        return f"whole-body inputs do not fit the robot: {'; '.join(wrong) or 'arrays must be flat'}"
+
+    def _allocate(self) -> None:
+        model, feet = self._model, len(self._model.feet)
+        joints, full = model.joints, model.joints + 3 * feet
+        self._tasks = task_count(model)
+        self._written = self._tasks + BASE + joints  # rows that change; friction follows
+        self._rows, self._bounds = np.zeros((self._written + SIDES * feet, full)), np.zeros((4, full))
+        self._side, self._base = np.zeros(self._tasks), np.zeros(BASE)
+        # Sides of the torque rows, then those of friction; the shorter problems use their beginning.
+        self._lower, self._upper = np.full(joints + SIDES * feet, -np.inf), np.zeros(joints + SIDES * feet)
+        self._loaded, self._x, self._acceleration = np.zeros(feet), np.zeros(full), np.zeros(BASE)
+
+    def _new_stance(self, contact: BoolArray) -> Stance:
+        joints, feet = self._model.joints, int(np.count_nonzero(contact))
+        size, count = joints + 3 * feet, joints + SIDES * feet
+        whole = feet == len(self._model.feet)
+        rows = self._rows if whole else np.zeros((self._written + SIDES * feet, size))
         bounds = self._bounds if whole else np.zeros((4, size))
-        problem = QpProblem.empty(QpSize(variables=size, rows=joints + SIDES * count))
-        problem.matrix[joints:] = friction_rows(joints, count, self._config.friction)
-        problem.upper[joints:] = 0.0
-        problem.floor, problem.ceiling = bounds[2], bounds[3]
+        rows[self._written :] = friction_rows(joints, feet, self._config.friction)
+        problem = QpProblem(
+            hessian=np.eye(size), gradient=np.zeros(size), matrix=rows[self._tasks + BASE :],
+            lower=self._lower[:count], upper=self._upper[:count], floor=bounds[2], ceiling=bounds[3],
+        )  # fmt: skip
+        kept = np.concatenate([np.ones(joints, dtype=np.bool_), np.repeat(contact, 3)])
         return Stance(
-            problem=problem, rows=rows, bounds=bounds, tasks=rows[: self._tasks],
-            plan=rows[self._tasks :], torque=rows[self._tasks + 6 :],
+            problem=problem, feet=feet, columns=None if whole else np.flatnonzero(kept),
+            rows=rows[: self._written], bounds=bounds, tasks=rows[: self._tasks],
+            base=rows[self._tasks : self._tasks + BASE], diagonal=problem.hessian.reshape(-1)[:: size + 1],
         )  # fmt: skip
 
     def _configure(self) -> None:
@@ -172,24 +212,11 @@ class Assembly:
             getattr(given, f"{name}_weight")[:] = getattr(weights, name)
         for name in ("com", "trunk", "momentum", "contact", "swing", "posture"):
             getattr(given, f"{name}_gain")[:] = getattr(gains, name)
-        given.ground[:] = _UP
-        # Finite stand-ins for "no limit", so that one product can tell whether all inputs are finite.
+        given.force_limit[:] = config.force_limit * self._model.weight
+        given.ramp[:] = max(config.force_ramp, _LEAST_RAMP)
         given.torque[:] = np.minimum(actuators.torque, _NO_LIMIT)
+        given.back_emf[:] = actuators.back_emf
         given.speed[:] = np.minimum(config.speed_share * actuators.speed, _NO_LIMIT)
         given.lower[:] = np.maximum(actuators.lower + config.joint_margin, -_NO_LIMIT)
         given.upper[:] = np.minimum(actuators.upper - config.joint_margin, _NO_LIMIT)
         given.braking[:] = config.joint_acceleration
-        self._finite = self.parameters[: parameter_layout(self._model).slices["com_weight"].start]
-
-
-_NO_LIMIT = 1e9
-_OPTIONAL = (
-    "com_velocity", "com_acceleration", "trunk_velocity", "trunk_acceleration", "foot_velocity",
-    "foot_acceleration", "posture_velocity", "posture_acceleration", "ground",
-)  # fmt: skip
-
-
-def unscaled(model: WholeBodyModel, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Joint accelerations (nj,) rad/s² and forces of the standing feet (k, 3) N, ground axes."""
-    joints = model.joints
-    return ACCELERATION_UNIT * x[:joints], (force_unit(model) * x[joints:]).reshape(-1, 3)

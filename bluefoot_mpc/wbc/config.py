@@ -19,7 +19,7 @@ class WholeBodyWeights:
     contact: float = 2000.0  # per (m/s²)², slip of a standing foot
     swing: float = 20.0  # per (m/s²)², swing foot
     posture: float = 0.01  # per (rad/s²)², every joint
-    force: float = 0.001  # per (share of the weight a foot carries)², away from an even share
+    force: float = 0.01  # per (share of the weight a foot carries)², away from an even share
 
     def __post_init__(self) -> None:
         for name in ("com", "trunk", "momentum"):

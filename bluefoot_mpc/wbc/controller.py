@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 
-from bluefoot_mpc.codegen import CodegenConfig, compiled
-from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.qp import QpStatus, Solver, SolverOptions, make_solver
 from bluefoot_mpc.types import BoolArray, Fallback, FloatArray
-from bluefoot_mpc.wbc.assembly import Assembly, Buffers, Stance
+from bluefoot_mpc.wbc.assembly import Assembly, Stance
 from bluefoot_mpc.wbc.config import WholeBodyConfig
-from bluefoot_mpc.wbc.constraints.unilateral import ForceRamp
 from bluefoot_mpc.wbc.inputs import WholeBodyInputs, WholeBodyPlan
 from bluefoot_mpc.wbc.ladder import into_limits, nearest_point, static_forces, static_torque
 from bluefoot_mpc.wbc.model import WholeBodyModel
-from bluefoot_mpc.wbc.problem import ACCELERATION_UNIT, check_function, force_unit
+from bluefoot_mpc.wbc.problem import plan_layout
 
 _RESIDUAL = 1e-6  # of the weight: a plan that misses the dynamics by more is not used
 _AT_LIMIT = 1e-5  # N·m
@@ -39,18 +35,16 @@ class WholeBodyController:
     def __init__(self, model: WholeBodyModel, config: WholeBodyConfig | None = None) -> None:
         self.model, self.config = model, config or WholeBodyConfig()
         self._assembly = Assembly(model, self.config)
-        sizes = [stance.problem.size for stance in self._assembly.stances]
-        self._solvers: list[Solver] = [
-            make_solver(self.config.solver, size, SolverOptions(warm_start=False)) for size in sizes
-        ]
-        limit = self.config.force_limit * model.weight
-        self._ramp = ForceRamp(len(model.feet), limit, self.config.force_ramp, model.weight)
-        self._check = _Check(model, self._assembly)
+        self._layout = plan_layout(model)
+        options = SolverOptions(warm_start=False)
+        feet = len(model.feet)
+        sizes = [self._assembly.stance(np.arange(feet) < count).problem.size for count in range(feet + 1)]
+        self._solvers: list[Solver] = [make_solver(self.config.solver, size, options) for size in sizes]
         self.reset()
 
     def reset(self) -> None:
         """The state after init: no plan before, every foot carries fully."""
-        self._ramp.reset()
+        self._assembly.reset()
         for solver in self._solvers:
             solver.reset()
         self._previous: WholeBodyPlan | None = None
@@ -67,53 +61,45 @@ class WholeBodyController:
         Raises:
             ConfigurationError: an input has not the length that this robot needs.
         """
-        contact = np.asarray(inputs.contact, dtype=np.bool_)
-        caps = self._ramp.step(contact, inputs.remaining, dt)
-        try:
-            finite = self._assembly.fill(inputs, caps, dt)
-        except ValueError as error:
-            raise ConfigurationError(f"whole-body inputs do not fit the robot: {error}") from error
-        if not finite:
+        contact, assembly = inputs.contact, self._assembly
+        if not assembly.fill(inputs, dt):
             return self._substitute(contact, _NOT_FINITE, dt)
+        stance = assembly.assemble(contact)
+        solution = self._solvers[stance.feet].solve(stance.problem)
         self._known = inputs.q
-        stance = self._assembly.assemble(contact)
-        solution = self._solvers[int(np.count_nonzero(contact))].solve(stance.problem)
         if solution.status is QpStatus.SOLVED:
-            plan = self._plan(stance, solution.x, contact, solution.iterations)
-            if plan.residual <= _RESIDUAL * self.model.weight:
-                return self._kept(plan)
+            assembly.evaluate(stance, solution.x)
+            if assembly.plan.residual[0] <= _RESIDUAL * self.model.weight:
+                return self._kept(self._plan(stance, solution.iterations))
         return self._nearest(stance, contact, f"{self.config.solver}: {solution.status}", dt)
 
     def _kept(self, plan: WholeBodyPlan) -> WholeBodyPlan:
         self._previous, self._without = plan, 0.0
         return plan
 
-    def _plan(self, stance: Stance, x: FloatArray, contact: BoolArray, iterations: int) -> WholeBodyPlan:
-        """The plan that x means, with torques from inverse dynamics."""
-        check, joints = self._check, self.model.joints
-        made = stance.plan @ x
-        np.add(made[:6], self._assembly.base, out=check.acceleration[:6])
-        np.multiply(x[:joints], ACCELERATION_UNIT, out=check.acceleration[6:])
-        check.force.fill(0.0)
-        check.force[contact] = (force_unit(self.model) * x[joints:]).reshape(-1, 3)
-        check.call()
-        problem, torque = stance.problem, made[6:]
-        margin = np.minimum(problem.upper[:joints] - torque, torque - problem.lower[:joints])
+    def _plan(self, stance: Stance, iterations: int) -> WholeBodyPlan:
+        """A copy of the plan that was evaluated last."""
+        flat, place, feet = self._assembly.flat_plan.copy(), self._layout.slices, len(self.model.feet)
         return WholeBodyPlan(
-            acceleration=check.acceleration.copy(), foot_force=check.force_in_world.copy(),
-            torque=check.torque.copy(), com_acceleration=check.com.copy(),
-            foot_acceleration=check.feet.copy(), status=Fallback.SOLVED,
-            residual=float(np.abs(check.residual).max()), iterations=iterations,
-            saturated=margin < _AT_LIMIT, reason="" if contact.any() else _NO_FOOT,
-        )  # fmt: skip
+            acceleration=flat[place["acceleration"]],
+            foot_force=flat[place["force"]].reshape(feet, 3),
+            torque=flat[place["torque"]],
+            com_acceleration=flat[place["com"]],
+            foot_acceleration=flat[place["feet"]].reshape(feet, 3),
+            status=Fallback.SOLVED,
+            residual=float(flat[-1]),
+            iterations=iterations,
+            saturated=flat[place["spare"]] < _AT_LIMIT,
+            reason="" if stance.feet else _NO_FOOT,
+        )
 
     def _nearest(self, stance: Stance, contact: BoolArray, cause: str, dt: float) -> WholeBodyPlan:
         """The same problem with its limits as penalties; torques are then cut to the envelope."""
         x = nearest_point(stance.problem)
         if x is None:
             return self._substitute(contact, f"{cause}, and no nearest point", dt)
-        x = into_limits(self.model, stance.problem, x, self.config.friction)
-        plan = self._plan(stance, x, contact, 0)
+        self._assembly.evaluate(stance, into_limits(self.model, stance.problem, x, self.config.friction))
+        plan = self._plan(stance, 0)
         if not plan.residual <= _RESIDUAL * self.model.weight:  # NaN too
             return self._substitute(contact, f"{cause}, and a nearest point that breaks the dynamics", dt)
         lowest, highest = self._envelope()
@@ -121,7 +107,7 @@ class WholeBodyController:
         lacking = float(np.abs(torque - plan.torque).max())
         plan = dataclasses.replace(
             plan, torque=torque, status=Fallback.NEAREST, residual=max(plan.residual, lacking),
-            saturated=(torque <= lowest) | (torque >= highest), reason=f"nearest point: {cause}",
+            reason=f"nearest point: {cause}",
         )  # fmt: skip
         return self._kept(plan)
 
@@ -157,19 +143,3 @@ class WholeBodyController:
         stall = given.strength[0] * given.torque
         lost = actuators.back_emf * given.v[6:]
         return np.minimum(-stall - lost, 0.0), np.maximum(stall - lost, 0.0)
-
-
-class _Check:
-    """Inverse dynamics of a plan, in arrays that are made once."""
-
-    def __init__(self, model: WholeBodyModel, assembly: Assembly) -> None:
-        feet, velocities = len(model.feet), model.pin_model.nv
-        self.acceleration, self.force = np.zeros(velocities), np.zeros((feet, 3))
-        self.torque, self.residual = np.zeros(model.joints), np.zeros(6)
-        self.force_in_world, self.com, self.feet = np.zeros((feet, 3)), np.zeros(3), np.zeros((feet, 3))
-        given = assembly.given
-        function: Any = compiled(check_function(model), CodegenConfig(enabled=assembly.codegen))
-        inputs = [given.q, given.v, given.ground, self.acceleration, self.force]
-        outputs = [self.torque, self.residual, self.force_in_world, self.com, self.feet]
-        self._function = Buffers(function, inputs, outputs)
-        self.call = self._function.call

@@ -1,9 +1,9 @@
 """The whole-body problem as expressions: from state, references and weights to matrices.
 
-Unknowns, scaled so that the solver meets numbers of like size: joint accelerations
-in units of `ACCELERATION_UNIT` and, per foot, two tangential and one normal force in
-units of `force_unit`. The cost is a weighted least squares of the tasks plus a diagonal
-(posture and force share); what binds are rows of torque and friction, and bounds.
+Unknowns: joint accelerations (rad/s²) and, per foot, two tangential and one
+normal force in units of `force_unit`, so that the solver meets numbers of like
+size. The cost is a weighted least squares of the tasks plus a diagonal (posture
+and force share); what binds are rows of torque and friction, and bounds.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
-import numpy as np
 
 from bluefoot_mpc.model.symbolic import SymbolicTree, TreeState
 from bluefoot_mpc.model.symbolic.algebra import quaternion_matrix
 from bluefoot_mpc.wbc.constraints.dynamics import ReducedDynamics, ground_axes
 from bluefoot_mpc.wbc.constraints.joints import acceleration_bounds
 from bluefoot_mpc.wbc.constraints.torque import torque_bounds
-from bluefoot_mpc.wbc.layout import parameter_layout
+from bluefoot_mpc.wbc.constraints.unilateral import force_caps
+from bluefoot_mpc.wbc.layout import Layout, parameter_layout
 from bluefoot_mpc.wbc.model import WholeBodyModel
 from bluefoot_mpc.wbc.tasks import com_task, foot_task, momentum_task, posture_target, trunk_task
 
-ACCELERATION_UNIT = 100.0
-"""rad/s² of a joint per unit of its unknown."""
+BASE = 6
+"""Coordinates of the floating base."""
 
 
 def force_unit(model: WholeBodyModel) -> float:
@@ -39,95 +39,112 @@ def task_count(model: WholeBodyModel) -> int:
 
 def reduced_dynamics(model: WholeBodyModel, given: SimpleNamespace) -> ReducedDynamics:
     """Dynamics in world axes as functions of the unknowns, at the state in `given`."""
-    rotation = quaternion_matrix(given.q[3:7])
-    gravity = ca.DM(model.pin_model.gravity.linear)
-    state = TreeState(
-        rotation=rotation, linear=rotation @ given.v[:3], angular=rotation @ given.v[3:6],
-        joints=given.q[7:], speeds=given.v[6:], gravity=gravity,
-    )  # fmt: skip
-    tree = SymbolicTree(model.pin_model, state, model.actuators.armature.tolist())
+    tree = SymbolicTree(model.pin_model, _state(model, given), model.actuators.armature.tolist())
     feet = [tree.foot(frame) for frame in model.frames]
-    return ReducedDynamics(tree, feet, ground_axes(given.ground), gravity)
+    axes = force_unit(model) * ground_axes(given.ground)
+    return ReducedDynamics(tree, feet, axes, ca.DM(model.pin_model.gravity.linear))
 
 
 def assembly_function(model: WholeBodyModel) -> ca.Function:
     """All that changes in the problem, for all feet standing, as one function of the flat parameters.
 
     Outputs (matrices transposed: CasADi stores columns first, numpy rows first):
-    ``rows`` (n, t + 6 + nj) of tasks, base acceleration and torque; ``side`` (t,) right
-    side of the tasks; ``base`` (6,) the base's acceleration at x = 0; ``lower`` and ``upper``
-    (nj,) of the torque rows; ``bounds`` (n, 4): diagonal of the cost, its linear part,
-    lower and upper bounds of x.
+    ``rows`` (n, t + 6 + nj): tasks, base acceleration (world axes, at the centre of mass) and
+    torque per unit of x; ``side`` (t,) right side of the tasks, negative; ``base`` (6,) that
+    acceleration at x = 0; ``lower`` and ``upper`` (nj,) of the torque rows; ``bounds`` (n, 4):
+    diagonal of the cost, its linear part, lower and upper bounds of x; ``loaded`` (k,).
     """
-    layout = parameter_layout(model)
-    vector, given = layout.symbols()
+    vector, given = parameter_layout(model).symbols()
     dynamics = reduced_dynamics(model, given)
-    rotation = quaternion_matrix(given.q[3:7])
-    matrix, side = _least_squares(model, dynamics, rotation, given)
-    base = dynamics.base(rotation)
-    torque = dynamics.torque
-    lowest, highest = torque_bounds(given.torque, given.strength, model.actuators.back_emf, given.v[6:])
-    units = _units(model)
-    rows = ca.vertcat(matrix, base.matrix, torque.matrix)
-    rows = ca.horzcat(*[units[j] * rows[:, j] for j in range(len(units))])
+    matrix, side = _least_squares(model, dynamics, given)
+    torque, base = dynamics.torque, (dynamics.linear, dynamics.angular)
+    lowest, highest = torque_bounds(given.torque, given.strength, given.back_emf, given.v[BASE:])
+    bounds, loaded = _bounds(model, given)
     outputs = {
-        "rows": rows.T,
-        "side": side,
-        "base": base.constant,
+        "rows": ca.vertcat(matrix, *[part.matrix for part in base], torque.matrix).T,
+        "side": -side,
+        "base": ca.vertcat(*[part.constant for part in base]),
         "lower": lowest - torque.constant,
         "upper": highest - torque.constant,
-        "bounds": _bounds(model, given, units),
+        "bounds": bounds,
+        "loaded": loaded,
     }
     return _function("whole_body", {"parameters": vector}, outputs)
 
 
-def check_function(model: WholeBodyModel) -> ca.Function:
-    """Inverse dynamics of a plan, by another algorithm than the problem's.
+def plan_layout(model: WholeBodyModel) -> Layout:
+    """What `plan_function` answers.
 
-    Inputs: ``q``, ``v``, ``ground`` (3,) normal, ``acceleration`` (nv,) Pinocchio's v̇ and
-    ``force`` (3 k,) N in the ground's axes. Outputs: ``torque`` (nj,) N·m, ``residual`` (6,)
-    N and N·m that the base lacks, ``force`` (3 k,) N world axes, ``com`` (3,) m/s², acceleration of
-    the centre of mass, ``feet`` (3 k,) m/s², accelerations of the foot points.
+    ``acceleration`` Pinocchio's v̇, ``force`` (N, world) of each foot, ``torque`` (N·m), ``com`` and
+    ``feet`` accelerations (m/s², world), ``spare`` (N·m) distance of each torque to its
+    envelope, ``residual`` largest error of the base's equations (N, N·m).
     """
-    pin_model, count = model.pin_model, len(model.feet)
-    q, v = ca.SX.sym("q", pin_model.nq), ca.SX.sym("v", pin_model.nv)
-    ground, force = ca.SX.sym("ground", 3), ca.SX.sym("force", 3 * count)
-    change = ca.SX.sym("acceleration", pin_model.nv)
-    rotation = quaternion_matrix(q[3:7])
-    gravity = ca.DM(pin_model.gravity.linear)
-    state = TreeState(
-        rotation=rotation, linear=rotation @ v[:3], angular=rotation @ v[3:6], joints=q[7:], speeds=v[6:],
-        gravity=gravity, linear_acceleration=rotation @ change[:3],
-        angular_acceleration=rotation @ change[3:6], accelerations=change[6:],
+    feet = 3 * len(model.feet)
+    return Layout(
+        {
+            "acceleration": model.pin_model.nv, "force": feet, "torque": model.joints, "com": 3,
+            "feet": feet, "spare": model.joints, "residual": 1,
+        }
     )  # fmt: skip
-    tree = SymbolicTree(pin_model, state)
+
+
+def plan_function(model: WholeBodyModel) -> ca.Function:
+    """The plan that the unknowns mean, by inverse dynamics: another algorithm than the problem's.
+
+    Inputs: the flat parameters, ``x`` of all feet (0 without contact), ``base`` (6,) its
+    acceleration in world axes at the centre of mass. Output: `plan_layout`.
+    """
+    vector, given = parameter_layout(model).symbols()
+    count, joints = len(model.feet), model.joints
+    x, base = ca.SX.sym("x", joints + 3 * count), ca.SX.sym("base", BASE)
+    rotation = quaternion_matrix(given.q[3:7])
+    com = SymbolicTree(model.pin_model, _state(model, given)).com
+    linear = base[:3] + ca.cross(com, base[3:])  # at the base's origin
+    state = _state(model, given, (linear, base[3:], x[:joints]))
+    tree = SymbolicTree(model.pin_model, state)
     feet = [tree.foot(frame) for frame in model.frames]
-    axes = ground_axes(ground)
-    pushes = [axes @ force[3 * i : 3 * i + 3] for i in range(count)]
-    linear, angular = tree.linear_bias, tree.angular_bias
-    torque = tree.joint_bias + ca.DM(model.actuators.armature) * change[6:]
+    axes = force_unit(model) * ground_axes(given.ground)
+    pushes = [axes @ x[joints + 3 * i : joints + 3 * i + 3] for i in range(count)]
+    lacking = [tree.linear_bias, tree.angular_bias]
+    torque = tree.joint_bias + ca.DM(model.actuators.armature) * x[:joints]
     for foot, push in zip(feet, pushes, strict=True):
-        linear = linear - push
-        angular = angular - ca.cross(foot.position - tree.com, push)
+        lacking[0] = lacking[0] - push
+        lacking[1] = lacking[1] - ca.cross(foot.position - tree.com, push)
         torque = torque - foot.jacobian.T @ push
+    lowest, highest = torque_bounds(given.torque, given.strength, given.back_emf, given.v[BASE:])
     outputs = {
+        "acceleration": ca.vertcat(rotation.T @ linear, rotation.T @ base[3:], x[:joints]),
+        "force": ca.vertcat(*pushes),
         "torque": torque,
-        "residual": ca.vertcat(linear, angular),
-        "force_in_world": ca.vertcat(*pushes),
-        "com": tree.linear_bias / tree.mass + gravity,
+        "com": tree.linear_bias / tree.mass + ca.DM(model.pin_model.gravity.linear),
         "feet": ca.vertcat(*[foot.drift for foot in feet]),
+        "spare": ca.fmin(highest - torque, torque - lowest),
+        "residual": ca.mmax(ca.fabs(ca.vertcat(*lacking))),
     }
-    inputs = {"q": q, "v": v, "ground": ground, "acceleration": change, "force": force}
-    return _function("whole_body_check", inputs, outputs)
+    flat = ca.vertcat(*[outputs[name] for name in plan_layout(model).slices])
+    return _function("whole_body_plan", {"parameters": vector, "x": x, "base": base}, {"plan": flat})
+
+
+def _state(
+    model: WholeBodyModel, given: SimpleNamespace, accelerations: Any = (None, None, None)
+) -> TreeState:
+    """The robot's state in world axes; accelerations of base (linear, angular) and joints."""
+    rotation = quaternion_matrix(given.q[3:7])
+    linear, angular, joints = accelerations
+    return TreeState(
+        rotation=rotation, linear=rotation @ given.v[:3], angular=rotation @ given.v[3:BASE],
+        joints=given.q[7:], speeds=given.v[BASE:], gravity=ca.DM(model.pin_model.gravity.linear),
+        linear_acceleration=linear, angular_acceleration=angular, accelerations=joints,
+    )  # fmt: skip
 
 
 def _least_squares(
-    model: WholeBodyModel, dynamics: ReducedDynamics, rotation: Any, given: SimpleNamespace
+    model: WholeBodyModel, dynamics: ReducedDynamics, given: SimpleNamespace
 ) -> tuple[Any, Any]:
     inertia = model.mass * model.size**2
     tasks = [
         com_task(dynamics, given),
-        trunk_task(dynamics, rotation @ given.v[3:6], given),
+        trunk_task(dynamics, given),
         momentum_task(dynamics, inertia, given),
         *[foot_task(dynamics, index, given) for index in range(len(model.feet))],
     ]
@@ -135,32 +152,27 @@ def _least_squares(
     return ca.vertcat(*[matrix for matrix, _ in weighted]), ca.vertcat(*[side for _, side in weighted])
 
 
-def _bounds(model: WholeBodyModel, given: SimpleNamespace, units: Any) -> Any:
-    """(n, 4) diagonal cost, linear cost, lower and upper bound of every unknown, in its unit."""
-    feet, joints = len(model.feet), model.joints
-    lowest, highest = acceleration_bounds(given.q[7:], given.v[6:], given, given.horizon)
-    share = given.force_cap / ca.fmax(ca.sum1(given.force_cap), 1e-9)
-    ratio = force_unit(model) / model.weight
-    push = given.force_weight * ratio * ratio
-    pushes, shares, floors, caps = [], [], [], []
-    for foot in range(feet):
-        pushes += [push] * 3
-        shares += [0.0, 0.0, -push * share[foot] / ratio]
+def _bounds(model: WholeBodyModel, given: SimpleNamespace) -> tuple[Any, Any]:
+    """(n, 4) diagonal cost, linear cost, lower and upper bound of every unknown; loads of the feet."""
+    lowest, highest = acceleration_bounds(given.q[7:], given.v[BASE:], given, given.horizon)
+    caps, loaded = force_caps(given, model.weight)
+    even = caps / ca.fmax(ca.sum1(caps), 1e-9 * model.weight)  # of the weight
+    unit = force_unit(model) / model.weight
+    cost = given.force_weight * unit * unit
+    pushes, shares, floors, ceilings = [], [], [], []
+    for foot in range(len(model.feet)):
+        pushes += [cost] * 3
+        shares += [0.0, 0.0, -cost / unit * even[foot]]
         floors += [-ca.inf, -ca.inf, 0.0]
-        caps += [ca.inf, ca.inf, given.force_cap[foot] / force_unit(model)]
-    unit = units[:joints]
-    weight = given.posture_weight * unit * unit
-    return ca.horzcat(
+        ceilings += [ca.inf, ca.inf, caps[foot] / force_unit(model)]
+    weight = given.posture_weight
+    columns = (
         ca.vertcat(weight, *pushes),
-        ca.vertcat(-weight * posture_target(given) / unit, *shares),
-        ca.vertcat(lowest / unit, *floors),
-        ca.vertcat(highest / unit, *caps),
+        ca.vertcat(-weight * posture_target(given), *shares),
+        ca.vertcat(lowest, *floors),
+        ca.vertcat(highest, *ceilings),
     )
-
-
-def _units(model: WholeBodyModel) -> Any:
-    feet = len(model.feet)
-    return np.concatenate([np.full(model.joints, ACCELERATION_UNIT), np.full(3 * feet, force_unit(model))])
+    return ca.horzcat(*columns), loaded
 
 
 def _function(name: str, inputs: dict[str, Any], outputs: dict[str, Any]) -> ca.Function:

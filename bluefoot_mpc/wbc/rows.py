@@ -12,8 +12,8 @@ import casadi as ca
 class Rows:
     """``matrix @ x + constant``, a quantity that is affine in the unknowns x.
 
-    x holds the joint accelerations (rad/s²), then three force components (N) per
-    foot in the axes of the ground.
+    x holds the joint accelerations (rad/s²), then three force components per foot
+    along the axes of the ground, in the problem's unit of force.
 
     Attributes:
         matrix: r x n expressions.
@@ -22,13 +22,6 @@ class Rows:
 
     matrix: Any
     constant: Any
-
-    def __add__(self, other: Rows) -> Rows:
-        return Rows(matrix=self.matrix + other.matrix, constant=self.constant + other.constant)
-
-    def turned(self, matrix: Any) -> Rows:
-        """The product of a matrix with the quantity."""
-        return Rows(matrix=matrix @ self.matrix, constant=matrix @ self.constant)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -51,11 +44,3 @@ class Task:
         matrix = ca.SX(self.rows.matrix)
         scaled = ca.vertcat(*[root[i] * matrix[i, :] for i in range(matrix.size1())])
         return scaled, root * (self.target - self.rows.constant)
-
-
-def stacked(*parts: Rows) -> Rows:
-    """Rows below each other."""
-    return Rows(
-        matrix=ca.vertcat(*[part.matrix for part in parts]),
-        constant=ca.vertcat(*[part.constant for part in parts]),
-    )

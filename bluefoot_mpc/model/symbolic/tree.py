@@ -101,6 +101,7 @@ class SymbolicTree:
 
     Attributes:
         mass: kg, of the robot.
+        angular_velocity: 3, rad/s, of the base.
         com: 3, m, centre of mass from the base's origin.
         com_velocity: 3, m/s.
         inertia: 3 x 3, kg·m², centroidal composite inertia.
@@ -200,6 +201,7 @@ class SymbolicTree:
 
     def _totals(self) -> None:
         whole, state = self._bodies[0], self._state
+        self.angular_velocity = state.angular
         self.mass = whole.mass
         self.com = whole.moment / whole.mass
         self.inertia = whole.inertia - parallel_axis(whole.mass, self.com)

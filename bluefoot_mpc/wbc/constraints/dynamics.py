@@ -25,7 +25,7 @@ class ReducedDynamics:
     Attributes:
         tree: the terms it was made from.
         feet: the foot points.
-        axes: 3 x 3, axes of the ground (columns: two tangents, normal) in which forces are unknown.
+        axes: 3 x 3, axes of the ground (columns: two tangents, normal), times the unit of the forces.
         linear: 3, m/s², base's spatial acceleration at the centre of mass, linear.
         angular: 3, rad/s², the base's angular acceleration.
         com: 3, m/s², acceleration of the centre of mass.
@@ -61,25 +61,24 @@ class ReducedDynamics:
             constant=self.linear.constant - lever @ self.angular.constant + foot.drift,
         )
 
-    def base(self, rotation: Any) -> Rows:
-        """6, rate of the base's twist in its own axes, linear before angular (Pinocchio's v̇)."""
-        lever = skew(self.tree.com)
-        linear, angular = self.linear, self.angular
-        at_origin = Rows(
-            matrix=linear.matrix + lever @ angular.matrix, constant=linear.constant + lever @ angular.constant
-        )
-        into = rotation.T
-        matrix = ca.vertcat(into @ at_origin.matrix, into @ angular.matrix)
-        return Rows(matrix=matrix, constant=ca.vertcat(into @ at_origin.constant, into @ angular.constant))
-
     def _torque(self) -> Rows:
-        tree = self.tree
-        coupling = ca.horzcat(tree.linear_map.T, tree.angular_map.T)
-        base = ca.vertcat(self.linear.matrix, self.angular.matrix)
-        rest = ca.vertcat(self.linear.constant, self.angular.constant)
+        tree, joints = self.tree, self._joints
+        linear, angular = self.linear.matrix, self.angular.matrix
+        # What the base takes from the joints is symmetric: half of it is computed.
+        shared = ca.SX(joints, joints)
+        for row in range(joints):
+            for column in range(row + 1):
+                moved = ca.dot(tree.linear_map[:, row], linear[:, column])
+                turned = ca.dot(tree.angular_map[:, row], angular[:, column])
+                shared[row, column] = shared[column, row] = moved + turned
         contact = ca.horzcat(*[foot.jacobian.T @ self.axes for foot in self.feet])
-        own = ca.horzcat(tree.joint_inertia, -contact)
-        return Rows(matrix=coupling @ base + own, constant=coupling @ rest + tree.joint_bias)
+        pushed = (
+            tree.linear_map.T @ linear[:, joints:] - angular[:, :joints].T @ self.momentum.matrix[:, joints:]
+        )
+        rest = tree.linear_map.T @ self.linear.constant + tree.angular_map.T @ self.angular.constant
+        return Rows(
+            matrix=ca.horzcat(tree.joint_inertia + shared, pushed - contact), constant=rest + tree.joint_bias
+        )
 
 
 def ground_axes(normal: Any) -> Any:

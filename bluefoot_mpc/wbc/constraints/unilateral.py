@@ -2,54 +2,34 @@
 
 from __future__ import annotations
 
-import numpy as np
+from types import SimpleNamespace
+from typing import Any
 
-from bluefoot_mpc.types import BoolArray, FloatArray
+import casadi as ca
 
-_LEAST = 1e-3  # share of a foot's cap that stays: an even share of the weight divides by the sum
+_LEAST = 1e-3  # share of a foot's cap that stays: the weight is shared in proportion to the caps
 _SPARE = 1.5  # of the weight, what the caps together must allow
 
 
-class ForceRamp:
+def force_caps(given: SimpleNamespace, weight: float) -> tuple[Any, Any]:
     """Largest normal force per foot: grows after touch-down, fades before the scheduled lift-off.
 
     Where the ramps together would not carry the robot (two pairs of feet that
     change at once), all of them are raised in proportion.
 
     Args:
-        feet: number of feet.
-        limit: N, largest normal force of a foot under full load.
-        ramp: s, from nothing to full.
+        given: parameters: ``contact`` (1 stands), ``loaded`` (share of the load at the last
+            tick), ``remaining`` (s until lift-off), ``dt`` (s), ``ramp`` (s, from nothing to
+            full) and ``force_limit`` (N, of a foot under full load).
         weight: N, of the robot.
+
+    Returns:
+        k caps in N, 0 without contact; k new shares of the load.
     """
-
-    def __init__(self, feet: int, limit: float, ramp: float, weight: float) -> None:
-        self._limit, self._ramp, self._weight = limit, ramp, weight
-        self._loaded = np.empty(feet)
-        self.reset()
-
-    def reset(self) -> None:
-        """Every foot carries fully."""
-        self._loaded.fill(1.0)
-
-    def step(self, contact: BoolArray, remaining: FloatArray | None, dt: float) -> FloatArray:
-        """(feet,) N, caps of this tick; 0 without contact.
-
-        Args:
-            contact: (feet,) which feet stand.
-            remaining: (feet,) s until the scheduled lift-off; None: none is scheduled.
-            dt: s since the last tick.
-        """
-        if self._ramp > 0.0:
-            np.minimum(self._loaded + dt / self._ramp, 1.0, out=self._loaded)
-        else:
-            self._loaded.fill(1.0)
-        self._loaded *= contact
-        share = self._loaded
-        if remaining is not None and self._ramp > 0.0:
-            share = np.minimum(share, np.maximum(remaining / self._ramp, 0.0)) * contact
-        share = np.maximum(share, _LEAST * contact)
-        total = self._limit * float(share.sum())
-        if 0.0 < total < _SPARE * self._weight:
-            share = share * (_SPARE * self._weight / total)
-        return np.asarray(share * self._limit)
+    loaded = ca.fmin(given.loaded + given.dt / given.ramp, 1.0) * given.contact
+    leaving = ca.fmax(given.remaining / given.ramp, 0.0)
+    share = ca.fmax(ca.fmin(loaded, leaving), _LEAST) * given.contact
+    total = given.force_limit * ca.sum1(share)
+    # Without a foot there is nothing to raise, and nothing to divide by.
+    raised = ca.fmax(1.0, _SPARE * weight / ca.fmax(total, 1e-3 * weight * _LEAST))
+    return raised * given.force_limit * share, loaded

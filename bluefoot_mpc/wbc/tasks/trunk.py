@@ -11,17 +11,16 @@ from bluefoot_mpc.wbc.rows import Task
 from bluefoot_mpc.wbc.tasks.feedback import wanted_acceleration
 
 
-def trunk_task(dynamics: ReducedDynamics, angular_velocity: Any, given: Any) -> Task:
+def trunk_task(dynamics: ReducedDynamics, given: Any) -> Task:
     """The task: angular acceleration of the trunk.
 
     Args:
         dynamics: what the unknowns do.
-        angular_velocity: 3, rad/s, of the trunk, world axes.
         given: parameters: ``q``, ``trunk`` (quaternion), ``trunk_velocity`` (rad/s),
             ``trunk_acceleration`` (rad/s²), both in world axes, ``trunk_gain``, ``trunk_weight``.
     """
     error = orientation_error(given.q[3:7], given.trunk)
-    rate = given.trunk_velocity - angular_velocity
+    rate = given.trunk_velocity - dynamics.tree.angular_velocity
     target = wanted_acceleration(given.trunk_acceleration, error, rate, given.trunk_gain)
     return Task(rows=dynamics.angular, target=target, weight=given.trunk_weight)
 
