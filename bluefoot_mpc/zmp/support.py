@@ -46,10 +46,9 @@ class Support:
         edge_offsets: (n, 4) m, of the same rows without the margin.
         edges: (n, 4, 2, 2) m, both ends of each row's edge.
         centre: (n, 2) m, mean of the standing feet.
-        feet: (n,) number of standing feet.
         valid: (n,) False where no foot stands: such a sample repeats the region
-            before it (at the start the first one after it); all False, and the
-            feet's mean for a region, when no sample has a foot.
+            before it, at the start the first one after it; the hull of all four
+            feet when no sample has a foot.
     """
 
     normals: FloatArray
@@ -57,7 +56,6 @@ class Support:
     edge_offsets: FloatArray
     edges: FloatArray
     centre: FloatArray
-    feet: FloatArray
     valid: BoolArray
 
 
@@ -90,20 +88,14 @@ class SupportPreview:
             ConfigurationError: the schedule has another number of samples.
         """
         self._check(schedule.stance.shape)
-        self._feet[:] = schedule.footholds[:, :, :2]
-        self._stance[:] = schedule.stance
+        valid = standing_samples(schedule, self._feet, self._stance)
         self._regions.call()
-        feet = self._stance.sum(axis=1)
-        valid = feet > 0.0
-        if not valid.all():
-            self._repeat(valid)
         return Support(
             normals=self._normals,
             offsets=self._offsets,
             edge_offsets=self._plain,
             edges=self._edges,
             centre=self._centre,
-            feet=feet,
             valid=valid,
         )
 
@@ -122,17 +114,31 @@ class SupportPreview:
                 f"the schedule has {shape[0]} samples, the support preview {len(self._stance)}"
             )
 
-    def _repeat(self, valid: BoolArray) -> None:
-        """Give samples without a foot the region before them, or the first one ahead."""
+
+def standing_samples(schedule: ContactSchedule, feet: FloatArray, stance: FloatArray) -> BoolArray:
+    """Write the feet of a schedule, and for samples without any those of the sample before.
+
+    Args:
+        schedule: n samples.
+        feet: (n, 4, 2) m, written.
+        stance: (n, 4), written: one where a foot counts as standing. When no
+            sample has a foot, all count, and the region is their hull.
+
+    Returns:
+        (n,) False where no foot stands.
+    """
+    feet[:] = schedule.footholds[:, :, :2]
+    stance[:] = schedule.stance
+    valid = np.logical_or.reduce(schedule.stance, axis=1)
+    if not valid.all():
         standing = np.flatnonzero(valid)
         if len(standing) == 0:
-            self._stance[:] = 1.0
-            self._regions.call()
-            return
-        last = np.searchsorted(standing, np.flatnonzero(~valid)) - 1
-        source = standing[np.maximum(last, 0)]
-        for array in (self._normals, self._offsets, self._plain, self._edges, self._centre):
-            array[~valid] = array[source]
+            stance[:] = 1.0
+        else:
+            before = np.searchsorted(standing, np.flatnonzero(~valid)) - 1
+            source = standing[np.maximum(before, 0)]
+            feet[~valid], stance[~valid] = feet[source], stance[source]
+    return np.asarray(valid)
 
 
 def support_margins(

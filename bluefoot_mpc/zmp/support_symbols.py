@@ -36,7 +36,7 @@ def region_function(samples: int) -> ca.Function:
     """
     feet, stance = ca.SX.sym("feet", 8), ca.SX.sym("stance", 4)
     margin, half_width = ca.SX.sym("margin"), ca.SX.sym("half_width")
-    outputs = _region(feet, stance, margin, half_width)
+    outputs = region(feet, stance, margin, half_width)
     single = ca.Function("support_region", [feet, stance, margin, half_width], outputs, {"cse": True})
     mapped: ca.Function = single.map(f"support_regions_{samples}", "serial", samples, [2, 3], [])
     return compiled(mapped)
@@ -57,7 +57,15 @@ def margin_function(samples: int) -> ca.Function:
     return compiled(mapped)
 
 
-def _region(feet: Any, stance: Any, margin: Any, half_width: Any) -> list[Any]:
+def region(feet: Any, stance: Any, margin: Any, half_width: Any) -> list[Any]:
+    """Normals, offsets, offsets without the margin, edges and centre of one sample.
+
+    Args:
+        feet: 8 m, x and y of each foot.
+        stance: 4, one where the foot stands.
+        margin: m, by which rows are pulled in, at most to the centre.
+        half_width: m, of the strip around feet on one line.
+    """
     points = [feet[2 * leg : 2 * leg + 2] for leg in _LEGS]
     ways = {(a, b): points[b] - points[a] for a, b in itertools.combinations(_LEGS, 2)}
     ways |= {(b, a): -way for (a, b), way in ways.items()}

@@ -50,10 +50,11 @@ class PreviewConfig:
     height: float = 0.1  # m, nominal distance of the centre of mass above the ground
     support: SupportConfig = field(default_factory=SupportConfig)
     weights: PreviewWeights = field(default_factory=PreviewWeights)
-    centre_pull: float = 0.0  # share of the way from the nominal place to the support's centre, 0 to 1
+    depth: float = 0.006  # m inside its region, where the ZMP is wanted
+    centre_pull: float = 0.0  # share of the way from there to the middle of the feet, 0 to 1
     reach: tuple[float, float] = (0.03, 0.03)  # m, forward and sideways from the nominal place
-    rows: int = 32  # constraints that one small problem holds
-    rounds: int = 8  # small problems per plan before the whole one is solved
+    rows: tuple[int, ...] = (16, 48)  # constraints that a small problem holds, the larger ones on demand
+    rounds: int = 8  # problems of one size per plan, before a larger one is posed
     tolerance: float = 1e-7  # m, violation that is none
     nearest_violation: float = 0.006  # m out of a region at which an approximate plan is still used
     stance_speed: float = 0.05  # m/s towards the middle of the feet when there is no plan
@@ -73,6 +74,9 @@ class PreviewConfig:
         )
         if not 0.0 <= self.centre_pull <= 1.0:
             raise ConfigurationError(f"centre_pull must lie in [0, 1], not {self.centre_pull!r}")
-        for name, least in (("samples", 2), ("rows", 4), ("rounds", 1)):
+        require_nonnegative(depth=self.depth)
+        for name, least in (("samples", 2), ("rounds", 1)):
             if getattr(self, name) < least:
                 raise ConfigurationError(f"{name} must be at least {least}, not {getattr(self, name)!r}")
+        if not self.rows or min(self.rows) < 1 or list(self.rows) != sorted(set(self.rows)):
+            raise ConfigurationError(f"rows must be positive and grow, not {self.rows!r}")

@@ -7,6 +7,7 @@ way to the middle of the feet.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -36,24 +37,22 @@ class PreviewController:
 
     Args:
         config: law, sizes, weights and bounds.
-        solvers: backends for the small and the whole problem in place of the
+        solvers: backends for problems of `program.sizes` in place of the
             configured one, for tests and benchmarks.
 
     Raises:
         UnknownNameError: there is no such law or solver.
     """
 
-    def __init__(self, config: PreviewConfig, solvers: tuple[Solver, Solver] | None = None) -> None:
+    def __init__(self, config: PreviewConfig, solvers: tuple[Solver, ...] | None = None) -> None:
         self.config = config
         self.maps = maps = preview_maps(config)
         self._problem = PreviewProblem(config, maps)
         if solvers is None:
             solvers = _solvers(config)
-        self._program = PreviewProgram(config, maps, *solvers)
-        self._by_shift = np.vstack([maps.forced @ maps.root, maps.root])
+        self._program = PreviewProgram(config, maps, solvers)
         self._by_law = self._problem.path_map(gain_map(config) if config.law == "kajita" else maps.optimum)
         self._by_optimum = self._problem.path_map(maps.optimum)
-        self._path = np.zeros((4 * config.samples, 2))
         self.reset()
 
     def reset(self) -> None:
@@ -80,7 +79,7 @@ class PreviewController:
         if not np.isfinite(pose).all():
             pose = np.zeros(3) if self._last is None else self._last.pose
         start = self._start(inputs, pose)
-        plan = self._planned(inputs, start) if self._problem.read(inputs, start) else None
+        plan = self._planned() if self._problem.read(inputs, start) else None
         if plan is not None:
             self._good = _Memory(plan, pose, self._clock)
         else:
@@ -108,26 +107,22 @@ class PreviewController:
             return carried(state, self._last.pose, pose)
         return np.vstack([inputs.nominal[0], np.zeros((2, 2))])
 
-    def _planned(self, inputs: PreviewInputs, start: FloatArray) -> ComPlan | None:
+    def _planned(self) -> ComPlan | None:
         """The plan of the configured law; None when it is not to be used."""
         problem, program = self._problem, self._program
-        np.matmul(self._by_law, problem.given, out=self._path)
-        status, iterations = Fallback.SOLVED, 0
-        if self.config.law == "constrained":
-            program.set_levers(problem.levers)
-            free = problem.rows.residuals(problem.values(self._path))
-            if free.min() < 0.0:
-                result = program.solve(problem.rows, free)
-                iterations = result.iterations
-                if not result.solved:
-                    status = Fallback.NEAREST
-                    result = program.approximate(problem.rows, free)
-                    if not result.solved:
-                        return None
-                self._path += self._by_shift @ result.shift
-        if not np.isfinite(self._path).all():
+        np.matmul(self._by_law, problem.given, out=problem.path)
+        least = float(problem.evaluate().min())
+        if not math.isfinite(least):
             return None
-        return problem.plan(self._path, start, status, iterations)
+        status, iterations = Fallback.SOLVED, 0
+        if self.config.law == "constrained" and least < 0.0:
+            result = program.solve(problem)
+            iterations = result.iterations
+            if not result.solved:
+                status = Fallback.NEAREST
+                if not program.approximate(problem).solved:
+                    return None
+        return problem.plan(status, iterations)
 
     def _previous(self, pose: FloatArray) -> ComPlan | None:
         """What is left of the last plan that was made; None when nothing is."""
@@ -148,11 +143,12 @@ class PreviewController:
         standing = stance & np.isfinite(feet).all(axis=1)
         goal = feet[standing].mean(axis=0) if standing.any() else start[0]
         self._problem.read_way(start, goal)
-        return self._problem.plan(self._by_optimum @ self._problem.given, start, Fallback.STANCE, 0)
+        np.matmul(self._by_optimum, self._problem.given, out=self._problem.path)
+        self._problem.evaluate()
+        return self._problem.plan(Fallback.STANCE, 0)
 
 
-def _solvers(config: PreviewConfig) -> tuple[Solver, Solver]:
-    small, whole = sizes(config)
+def _solvers(config: PreviewConfig) -> tuple[Solver, ...]:
     # The rows of a problem are others every time: there is nothing to start from.
     options = SolverOptions(warm_start=False)
-    return make_solver(config.solver, small, options), make_solver(config.solver, whole, options)
+    return tuple(make_solver(config.solver, size, options) for size in sizes(config))

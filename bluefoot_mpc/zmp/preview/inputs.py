@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bluefoot_mpc.model.parameters import GRAVITY
 from bluefoot_mpc.types import ContactSchedule, FloatArray
 
 
@@ -21,15 +20,17 @@ class PreviewInputs:
             its reference, and the middle of its reach.
         velocity: (n, 2) m/s over the ground, wanted of the centre of mass; None
             for the rate of change of `nominal`.
-        zmp: (n, 2) m, wanted ZMP; None leads it from `nominal` towards the
-            middle of the support by the configured share.
+        zmp: (n, 2) m, wanted ZMP; None leads `nominal` into the support by the
+            configured depth, and from there on to the middle by the configured share.
         state: (3, 2) position, velocity and acceleration of the centre of mass
             now; None takes them from the previous plan.
         height: m or (n,) m, vertical distance of the centre of mass above the
             ground plane; None for the configured one.
         rise: (n,) m/s², its second derivative; None for a constant height.
-        slope: (2,) rise of the ground plane per metre along x and y.
-        gravity: (3,) m/s², in the axes of the plan.
+        slope: (2,) rise of the ground plane per metre along x and y of b'; None for none.
+            It matters only when gravity is not along z as well: a centre of mass
+            that follows the plane meets level ground's law in horizontal axes.
+        gravity: (3,) m/s², in the axes of the plan; None for straight down.
         reach: (n, 2) m, half the box around `nominal` that the legs allow, along
             and across the heading; None for the configured one.
         heading: (n,) rad, direction of that box; None for the x axis.
@@ -44,8 +45,8 @@ class PreviewInputs:
     state: FloatArray | None = None
     height: float | FloatArray | None = None
     rise: FloatArray | None = None
-    slope: FloatArray = field(default_factory=lambda: np.zeros(2))
-    gravity: FloatArray = field(default_factory=lambda: np.array([0.0, 0.0, -GRAVITY]))
+    slope: FloatArray | None = None
+    gravity: FloatArray | None = None
     reach: FloatArray | None = None
     heading: FloatArray | None = None
     pose: FloatArray = field(default_factory=lambda: np.zeros(3))

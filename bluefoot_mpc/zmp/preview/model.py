@@ -98,14 +98,18 @@ def _constant(expression: Any) -> FloatArray:
     return np.ascontiguousarray(ca.evalf(expression).full())
 
 
-def levers(height: FloatArray, rise: FloatArray, slope: FloatArray, gravity: FloatArray) -> FloatArray:
-    """(n,) s², distance of the ZMP from the centre of mass per horizontal acceleration.
+def levers(
+    height: float | FloatArray, rise: FloatArray | None, slope: FloatArray | None, gravity: FloatArray | None
+) -> FloatArray:
+    """() or (n,) s², distance of the ZMP from the centre of mass per horizontal acceleration.
 
     Args:
-        height: (n,) m, vertical distance of the centre of mass above the ground plane.
-        rise: (n,) m/s², second derivative of that distance.
-        slope: (2,) rise of the plane per metre along x and y of the plan's frame.
-        gravity: (3,) m/s² in that frame, pointing down.
+        height: m or (n,) m, vertical distance of the centre of mass above the ground plane.
+        rise: (n,) m/s², second derivative of that distance; None for none.
+        slope: (2,) rise of the plane per metre along x and y of the plan's frame; None for none.
+        gravity: (3,) m/s² in that frame, pointing down; None for straight down.
     """
-    pull = slope[0] * gravity[0] + slope[1] * gravity[1] - gravity[2]
-    return np.asarray(height / (rise + pull))
+    pull = GRAVITY if gravity is None else -float(gravity[2])
+    if gravity is not None and slope is not None:
+        pull += float(slope @ gravity[:2])
+    return np.asarray(height / (pull if rise is None else pull + rise))

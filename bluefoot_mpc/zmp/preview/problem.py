@@ -1,29 +1,33 @@
-"""One tick's preview problem: start, references, rows and levers in fixed arrays, and the plan of a path."""
+"""One tick's preview problem in fixed arrays: start, references, rows, and where a path meets them."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from bluefoot_mpc.types import Fallback, FloatArray
+from bluefoot_mpc.types import BoolArray, Fallback, FloatArray
+from bluefoot_mpc.zmp.binding import Bound
 from bluefoot_mpc.zmp.preview.config import PreviewConfig
 from bluefoot_mpc.zmp.preview.inputs import PreviewInputs
 from bluefoot_mpc.zmp.preview.model import PreviewMaps, levers
 from bluefoot_mpc.zmp.preview.plan import ComPlan
-from bluefoot_mpc.zmp.preview.program import Rows
-from bluefoot_mpc.zmp.support import Support, SupportPreview
-
-_BOX = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+from bluefoot_mpc.zmp.preview.symbols import residual_function, rows_function
+from bluefoot_mpc.zmp.support import standing_samples
+from bluefoot_mpc.zmp.support_symbols import margin_function
 
 
 class PreviewProblem:
     """Workspace of one tick's problem; holds no memory of earlier ones.
 
-    A path is (4n, 2): positions, velocities, accelerations and jerks of both axes.
+    Constrained points are the ZMP (n) and the centre of mass (n) at the samples
+    and the capture point at the end, with four rows ``normal · point <= offset``
+    each: 2n + 1 points, 8n + 4 rows.
 
     Attributes:
         given: (3 + 3n, 2) start, wanted ZMP, position and velocity.
-        rows: the constraints.
         levers: (n,) s², distance of the ZMP from the centre of mass per acceleration.
+        normals: (8n + 4, 2) unit vectors of the rows.
+        path: (4n, 2) positions, velocities, accelerations and jerks of a plan.
+        residuals: (8n + 4,) m, how far that path lies inside the rows.
 
     Args:
         config: sizes, bounds and defaults.
@@ -32,33 +36,74 @@ class PreviewProblem:
 
     def __init__(self, config: PreviewConfig, maps: PreviewMaps) -> None:
         n = config.samples
-        self._config, self._maps = config, maps
+        self._config, self._maps, self._samples = config, maps, n
         self._time = np.float64(config.interval) * np.arange(1, n + 1)
-        self._support_preview = SupportPreview(config.support, n)
-        self._support: Support | None = None
-        self.given = np.zeros((3 + 3 * n, 2))
-        self._zmp, self._position, self._velocity = self.given[3:].reshape(3, n, 2)
-        self.rows = Rows(normals=np.zeros((2 * n + 1, 4, 2)), offsets=np.zeros((2 * n + 1, 4)))
-        self.levers = np.zeros(n)
-        self._height, self._rise = np.zeros(n), np.zeros(n)
-        self._values = np.zeros((2 * n + 1, 2))
-        self._reach = np.zeros((n, 2))
+        self.given, self.path = np.zeros((3 + 3 * n, 2)), np.zeros((4 * n, 2))
+        self._wanted, self._nominal, self._velocity = self.given[3:].reshape(3, n, 2)
+        self._level = np.full(n, maps.lever)
+        self.levers = self._level.copy()
+        self.normals, self._offsets = np.zeros((8 * n + 4, 2)), np.zeros((2 * n, 4))
+        self.residuals, self._zmp = np.zeros(8 * n + 4), np.zeros((n, 2))
+        self._plain, self._edges = np.zeros((n, 4)), np.zeros((n, 4, 2, 2))
+        self._margin = np.zeros(n)
+        self._valid: BoolArray = np.zeros(n, dtype=np.bool_)
+        self._bind(n)
+
+    def _bind(self, n: int) -> None:
+        config, support = self._config, self._config.support
+        self._feet, self._stance = np.zeros((n, 4, 2)), np.zeros((n, 4))
+        self._gravity = np.zeros(2)
+        self._heading, self._reach = np.zeros((n, 2)), np.zeros((n, 2))
+        choices = np.array([support.margin, support.half_width, config.depth, config.centre_pull])
+        at_zmp, at_com = self.normals[: 4 * n], self.normals[4 * n : 8 * n]
+        of_zmp, of_com = self._offsets[:n], self._offsets[n:]
+        self._rows = Bound(
+            rows_function(n),
+            (self._feet, self._stance, self._nominal, self._heading, self._reach, choices),
+            (self._wanted, at_zmp, of_zmp, self._plain, self._edges, at_com, of_com),
+        )
+        parts = self.residuals[: 4 * n], self.residuals[4 * n : 8 * n], self.residuals[8 * n :]
+        self._inside = Bound(
+            residual_function(n),
+            (self.path[:n], self.path[2 * n : 3 * n], self.levers, at_zmp, of_zmp, at_com, of_com,
+             self._gravity, self.path[2 * n - 1]),
+            (self._zmp, *parts),
+        )  # fmt: skip
+        self._measure = Bound(
+            margin_function(n), (self._zmp, at_zmp, self._plain, self._edges), (self._margin,)
+        )
 
     def path_map(self, jerks: FloatArray) -> FloatArray:
         """(4n, 3 + 3n) path by what is given, of a law that is (n, 3 + 3n) jerks by what is given."""
         path = np.vstack([self._maps.forced @ jerks, jerks])
-        path[: len(self._maps.free), :3] += self._maps.free
+        path[: 3 * self._samples, :3] += self._maps.free
         return np.asarray(path)
 
     def read(self, inputs: PreviewInputs, start: FloatArray) -> bool:
-        """Take one tick's inputs; False when no plan can be made of them."""
-        support = self._support = self._support_preview.build(inputs.schedule)
-        self._take_height(inputs)
-        self._take_references(inputs, start, support)
-        self._take_rows(inputs, support)
-        # One sum is finite only where every part is.
-        total = self.given.sum() + self.levers.sum() + self.rows.offsets.sum() + self.rows.normals.sum()
-        return bool(np.isfinite(total) and self.levers.min() > 0.0 and support.valid.any())
+        """Take one tick's inputs; False when no plan can be made of them.
+
+        Numbers that are not finite show in the residuals of any path.
+        """
+        config, n = self._config, self._samples
+        self._valid = standing_samples(inputs.schedule, self._feet, self._stance)
+        self.given[:3] = start
+        self._nominal[:] = inputs.nominal
+        self._reach[:] = config.reach if inputs.reach is None else inputs.reach
+        if inputs.heading is None:
+            self._heading[:] = (1.0, 0.0)
+        else:
+            self._heading[:, 0], self._heading[:, 1] = np.cos(inputs.heading), np.sin(inputs.heading)
+        self._rows.call()
+        self.normals[8 * n :] = self.normals[4 * n - 4 : 4 * n]
+        if inputs.zmp is not None:
+            self._wanted[:] = inputs.zmp
+        if inputs.velocity is not None:
+            self._velocity[:] = inputs.velocity
+        else:
+            np.subtract(self._nominal[1:], self._nominal[:-1], out=self._velocity[1:])
+            self._velocity[1:] *= 1.0 / config.interval
+            self._velocity[0] = self._velocity[1]
+        return self._take_height(inputs) and bool(self._valid.any())
 
     def read_way(self, start: FloatArray, goal: FloatArray) -> None:
         """Take the straight way from a (3, 2) start to a (2,) goal at the configured speed."""
@@ -66,78 +111,43 @@ class PreviewProblem:
         distance = float(np.hypot(*way))
         reached = np.minimum(self._config.stance_speed * self._time, distance)
         self.given[:3] = start
-        self._position[:] = start[0] + reached[:, None] * (way / max(distance, 1e-9))
-        self._zmp[:] = self._position
+        self._nominal[:] = start[0] + reached[:, None] * (way / max(distance, 1e-9))
+        self._wanted[:] = self._nominal
         self._velocity[:] = 0.0
-        self.levers[:] = self._maps.lever
-        if self._support is not None and not np.isfinite(self._support.edges).all():
-            self._support = None
+        self.levers[:], self._gravity[:] = self._level, 0.0
 
-    def values(self, path: FloatArray) -> FloatArray:
-        """(2n + 1, 2) m, constrained points of a path: ZMP, centre of mass, capture point at the end."""
-        n = len(self.levers)
-        self._values[:n] = path[:n] - self.levers[:, None] * path[2 * n : 3 * n]
-        self._values[n : 2 * n] = path[:n]
-        self._values[2 * n] = path[n - 1] + np.sqrt(self.levers[-1]) * path[2 * n - 1]
-        return self._values
+    def evaluate(self) -> FloatArray:
+        """(8n + 4,) m, residuals of the path; the array is overwritten by the next call."""
+        self._inside.call()
+        return self.residuals
 
-    def plan(self, path: FloatArray, start: FloatArray, status: Fallback, iterations: int) -> ComPlan:
-        """The plan of a path, with its margins and violations."""
-        n, values = len(self.levers), self.values(path)
-        position, velocity, acceleration, jerk = path.copy().reshape(4, n, 2)
-        zmp = values[:n].copy()
-        support = self._support
-        if support is None or not support.valid.any():
-            margin, slack, supported = np.full(n, np.nan), np.full(3, np.nan), np.zeros(n, dtype=np.bool_)
+    def plan(self, status: Fallback, iterations: int) -> ComPlan:
+        """The plan of the path, evaluated before, with its margins and violations."""
+        n, residuals = self._samples, self.residuals
+        position, velocity, acceleration, jerk = self.path.copy().reshape(4, n, 2)
+        if self._valid.any():
+            self._measure.call()
+            margin, supported = self._margin.copy(), self._valid
+            parts = residuals[: 4 * n].min(), residuals[4 * n : 8 * n].min(), residuals[8 * n :].min()
+            slack = np.array([max(0.0, -float(part)) for part in parts])
         else:
-            margin, supported = self._support_preview.margins(zmp).copy(), support.valid
-            slack = self._slack(values)
+            margin, supported, slack = np.full(n, np.nan), self._valid, np.full(3, np.nan)
         return ComPlan(
-            time=self._time, start=np.array(start), position=position, velocity=velocity,
-            acceleration=acceleration, jerk=jerk, zmp=zmp, margin=margin, supported=supported,
-            slack=slack, status=status, iterations=iterations,
+            time=self._time, start=self.given[:3].copy(), position=position, velocity=velocity,
+            acceleration=acceleration, jerk=jerk, zmp=self._zmp.copy(), margin=margin,
+            supported=supported, slack=slack, status=status, iterations=iterations,
         )  # fmt: skip
 
-    def _slack(self, values: FloatArray) -> FloatArray:
-        n, inside = len(self.levers), self.rows.residuals(values)
-        parts = inside[: 4 * n].min(), inside[4 * n : 8 * n].min(), inside[8 * n :].min()
-        return np.array([max(0.0, -float(part)) for part in parts])
-
-    def _take_height(self, inputs: PreviewInputs) -> None:
-        self._height[:] = self._config.height if inputs.height is None else inputs.height
-        self._rise[:] = 0.0 if inputs.rise is None else inputs.rise
-        self.levers[:] = levers(self._height, self._rise, inputs.slope, inputs.gravity)
-
-    def _take_references(self, inputs: PreviewInputs, start: FloatArray, support: Support) -> None:
-        self.given[:3] = start
-        nominal = self._position
-        nominal[:] = inputs.nominal
-        if inputs.velocity is not None:
-            self._velocity[:] = inputs.velocity
-        else:
-            np.subtract(nominal[1:], nominal[:-1], out=self._velocity[1:])
-            self._velocity[1:] /= self._config.interval
-            self._velocity[0] = self._velocity[1]
-        if inputs.zmp is not None:
-            self._zmp[:] = inputs.zmp
-        else:
-            self._zmp[:] = nominal
-            if self._config.centre_pull > 0.0:
-                self._zmp += self._config.centre_pull * (support.centre - nominal)
-
-    def _take_rows(self, inputs: PreviewInputs, support: Support) -> None:
-        n, normals, offsets = len(self.levers), self.rows.normals, self.rows.offsets
-        normals[:n], offsets[:n] = support.normals, support.offsets
-        normals[2 * n], offsets[2 * n] = support.normals[-1], support.offsets[-1]
-        box, around = normals[n : 2 * n], offsets[n : 2 * n]
-        if inputs.heading is None:
-            box[:] = _BOX
-        else:
-            c, s = np.cos(inputs.heading), np.sin(inputs.heading)
-            box[:, 0], box[:, 2] = np.stack([c, s], axis=1), np.stack([-s, c], axis=1)
-            np.negative(box[:, 0::2], out=box[:, 1::2])
-        self._reach[:] = self._config.reach if inputs.reach is None else inputs.reach
-        middle = self._position
-        along = box[:, 0::2, 0] * middle[:, :1] + box[:, 0::2, 1] * middle[:, 1:]
-        np.add(along, self._reach, out=around[:, 0::2])
-        np.subtract(self._reach, along, out=around[:, 1::2])
+    def _take_height(self, inputs: PreviewInputs) -> bool:
+        """Take levers and gravity; False where the centre of mass does not press on the ground."""
+        height, gravity = inputs.height, inputs.gravity
+        if height is None and inputs.rise is None and gravity is None:
+            self.levers[:], self._gravity[:] = self._level, 0.0
+            return True
+        self.levers[:] = levers(
+            self._config.height if height is None else height, inputs.rise, inputs.slope, gravity
+        )
+        if gravity is not None:
+            self._gravity[:] = gravity[:2]
+            self._wanted -= self.levers[:, None] * self._gravity  # the cost's ZMP leaves gravity out
+        return bool(self.levers.min() > 0.0 and self.levers.max() < np.inf)

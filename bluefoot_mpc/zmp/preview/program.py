@@ -1,12 +1,16 @@
-"""The preview's quadratic program, solved on the few constraints that matter.
+"""The preview's quadratic program, solved on the few rows that matter.
 
-In coordinates in which the cost is |w|² a plan is its unconstrained optimum
-plus the shortest w that meets the rows. Only rows near the plan can be active:
-the smallest residuals are put into a problem of fixed size, the plan that comes
-out is checked against all rows, and the problem is posed again with the rows
-that it broke. As rows that are met stay in, the cost grows with every round, and
-the last plan is the optimum of the whole problem. Each row has a slack with
-a quadratic price, so that there always is a plan.
+In coordinates w in which the cost is |w|² / 2, a plan is its unconstrained
+optimum plus the shortest w that meets all rows; each row has a slack with a
+quadratic price, so that there always is one. Such a w is a sum of the responses
+of the rows that are met, so a problem on k rows needs k unknowns only: with
+Γ = A Aᵀ + 1/price = L Lᵀ it is the shortest y with L y <= b, whatever the horizon.
+
+Only rows near the plan can be met. Those with the smallest residuals go into a
+problem of fixed size, the plan that comes out is checked against all rows, and
+the problem is posed again with the rows that it broke. Rows that are met stay in,
+so the cost grows with every round, none comes twice, and the last plan is the
+optimum of the whole problem.
 """
 
 from __future__ import annotations
@@ -16,16 +20,19 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bluefoot_mpc.qp.problem import QpProblem, QpSize
-from bluefoot_mpc.qp.solution import QpSolution, QpStatus
+from bluefoot_mpc.qp import QpProblem, QpSize, QpSolution
 from bluefoot_mpc.types import FloatArray
 from bluefoot_mpc.zmp.preview.config import PreviewConfig
 from bluefoot_mpc.zmp.preview.model import PreviewMaps
+from bluefoot_mpc.zmp.preview.problem import PreviewProblem
 
 _UNIT = 1e-3
 """m, length that is one in the problem: solvers have absolute tolerances."""
 _GRADIENT_STEPS = 200
+
+Indices = NDArray[np.intp]
 
 
 class Solver(Protocol):
@@ -39,67 +46,46 @@ class Solver(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Rows:
-    """Constraints ``normal · value <= offset`` on planar points of a plan, four to a point.
-
-    Points are the ZMP (n) and the centre of mass (n) at the samples, and the
-    capture point at the end: 2n + 1 in all.
-
-    Attributes:
-        normals: (2n + 1, 4, 2) unit vectors.
-        offsets: (2n + 1, 4) m.
-    """
-
-    normals: FloatArray
-    offsets: FloatArray
-
-    def residuals(self, values: FloatArray) -> FloatArray:
-        """(8n + 4,) m, how far (2n + 1, 2) points lie inside the rows."""
-        inside = self.offsets - self.normals[:, :, 0] * values[:, :1]
-        inside -= self.normals[:, :, 1] * values[:, 1:]
-        return inside.reshape(-1)
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
 class ProgramResult:
-    """How a program ended.
+    """How a program ended; the problem's path is the plan.
 
     Attributes:
-        shift: (n, 2) w of both axes, added to the unconstrained optimum; the
-            last iterate when `solved` is False.
-        solved: True when it is the optimum.
+        solved: True when the plan is what was asked for.
         iterations: of the solver, all rounds together.
     """
 
-    shift: FloatArray
     solved: bool
     iterations: int
+
+
+def sizes(config: PreviewConfig) -> tuple[QpSize, ...]:
+    """Sizes of the problems, the last one with all rows."""
+    whole = 8 * config.samples + 4
+    counts = [*(count for count in config.rows if count < whole), whole]
+    return tuple(QpSize(variables=count, rows=count) for count in counts)
 
 
 class PreviewProgram:
     """Workspace of the program; only the solvers keep memory between plans.
 
     Args:
-        config: sizes, weights and tolerances.
+        config: weights and tolerances.
         maps: the problem of one axis.
-        small: solver for problems of `small_size`.
-        whole: solver for problems of `whole_size`, asked when rounds or rows do not suffice.
+        solvers: for problems of `sizes`, in their order.
     """
 
-    def __init__(self, config: PreviewConfig, maps: PreviewMaps, small: Solver, whole: Solver) -> None:
+    def __init__(self, config: PreviewConfig, maps: PreviewMaps, solvers: tuple[Solver, ...]) -> None:
         n = config.samples
-        self._config, self._samples = config, n
-        self._position, self._velocity, self._acceleration = (maps.forced @ maps.root).reshape(3, n, n)
+        self._config = config
+        self._by_shift = np.vstack([maps.forced @ maps.root, maps.root])
         self._levers = np.full(n, np.nan)
-        self.responses = np.zeros((2 * n + 1, n))
-        """Points per w: ZMP, centre of mass, capture point at the end."""
-        self.responses[n : 2 * n] = self._position
+        self._responses = np.zeros((2 * n + 1, n))  # points per w
+        self._products = np.zeros((2 * n + 1, 2 * n + 1))
         weights = config.weights
         prices = np.repeat([weights.support_slack, weights.reach_slack, weights.capture_slack], [n, n, 1])
-        self.softness = np.repeat(prices**-0.5, 4)
-        """Slack of each row per unit of its own coordinate."""
+        self._softness = np.repeat(1.0 / prices, 4)
         self._stages = tuple(
-            _Stage(solver, size) for solver, size in zip((small, whole), sizes(config), strict=True)
+            _Stage(solver, size.rows) for solver, size in zip(solvers, sizes(config), strict=True)
         )
 
     def reset(self) -> None:
@@ -107,119 +93,107 @@ class PreviewProgram:
         for stage in self._stages:
             stage.solver.reset()
 
-    def set_levers(self, levers: FloatArray) -> None:
-        """Take the (n,) distances of the ZMP per acceleration, s²."""
-        if not np.array_equal(levers, self._levers):
-            n = self._samples
-            self._levers[:] = levers
-            np.multiply(levers[:, None], self._acceleration, out=self.responses[:n])
-            np.subtract(self._position, self.responses[:n], out=self.responses[:n])
-            self.responses[2 * n] = self._position[-1] + np.sqrt(levers[-1]) * self._velocity[-1]
-
-    def solve(self, rows: Rows, free: FloatArray) -> ProgramResult:
-        """Find the shortest change of the unconstrained optimum that meets the rows.
-
-        Args:
-            rows: the constraints.
-            free: (8n + 4,) m, residuals of the unconstrained optimum.
-        """
-        config, iterations = self._config, 0
-        shift = np.zeros((self._samples, 2))
-        near = free
-        for stage, rounds in zip(self._stages, (config.rounds, 1), strict=True):
-            for _ in range(rounds):
-                chosen = stage.choose(near)
+    def solve(self, problem: PreviewProblem) -> ProgramResult:
+        """Turn the problem's path from the unconstrained optimum, evaluated before, into the optimum."""
+        self._take_levers(problem.levers)
+        optimum, free = problem.path.copy(), problem.residuals.copy()
+        iterations = 0
+        for stage in self._stages:
+            for _ in range(self._config.rounds):
+                chosen = stage.choose(problem.residuals)
                 if chosen is None:
                     break
-                solution = stage.solve(self, rows, free, chosen)
-                iterations += solution.iterations
-                if not solution.ok:
+                count, multiplier = stage.solve(self._gram(problem, chosen), free[chosen])
+                iterations += count
+                if multiplier is None:
                     break
-                shift = solution.x[: shift.size].reshape(2, -1).T * _UNIT
-                near = free - _moved(rows, self.responses @ shift)
-                outside = near < -config.tolerance
+                self._move(problem, optimum, chosen, multiplier)
+                outside = problem.residuals < -self._config.tolerance
                 outside[chosen] = False
                 if not outside.any():
-                    return ProgramResult(shift=shift, solved=True, iterations=iterations)
-        return ProgramResult(shift=shift, solved=False, iterations=iterations)
+                    return ProgramResult(solved=True, iterations=iterations)
+        problem.path[:] = optimum
+        problem.evaluate()
+        return ProgramResult(solved=False, iterations=iterations)
 
-    def approximate(self, rows: Rows, free: FloatArray) -> ProgramResult:
-        """A plan near the optimum without any solver: projected gradients on the rows' multipliers.
+    def approximate(self, problem: PreviewProblem) -> ProgramResult:
+        """Turn the path from the unconstrained optimum into one near the optimum, without any solver.
 
-        It counts as solved when no row is violated by more than is configured.
-
-        Args:
-            rows: the constraints.
-            free: (8n + 4,) m, residuals of the unconstrained optimum.
+        Projected gradients on the multipliers. It counts as solved when no row
+        is broken by more than is configured.
         """
-        chosen = np.argsort(free)[: 4 * self._config.rows]
-        responses, normals = self.responses[chosen >> 2], rows.normals.reshape(-1, 2)[chosen]
-        matrix = np.hstack([responses * normals[:, :1], responses * normals[:, 1:]])
-        gram = matrix @ matrix.T + np.diag(self.softness[chosen] ** 2)
+        self._take_levers(problem.levers)
+        optimum, free = problem.path.copy(), problem.residuals
+        chosen = np.argsort(free)[: 2 * self._config.rows[-1]]
+        free, gram = free[chosen], self._gram(problem, chosen)
         step = 1.0 / float(np.abs(gram).sum(axis=1).max())
-        multiplier, point, momentum = np.zeros(len(chosen)), np.zeros(len(chosen)), 1.0
+        multiplier, point = np.zeros(len(chosen)), np.zeros(len(chosen))
+        momentum = 1.0
         for _ in range(_GRADIENT_STEPS):
-            following = np.maximum(point - step * (gram @ point + free[chosen]), 0.0)
+            following = np.maximum(point - step * (gram @ point + free), 0.0)
             faster = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * momentum * momentum))
             point = following + (momentum - 1.0) / faster * (following - multiplier)
             multiplier, momentum = following, faster
-        shift = -(multiplier @ matrix).reshape(2, -1).T
-        near = free - _moved(rows, self.responses @ shift)
-        return ProgramResult(
-            shift=shift, solved=bool(near.min() > -self._config.nearest_violation), iterations=_GRADIENT_STEPS
-        )
+        self._move(problem, optimum, chosen, multiplier)
+        near_enough = bool(problem.residuals.min() > -self._config.nearest_violation)
+        return ProgramResult(solved=near_enough, iterations=_GRADIENT_STEPS)
 
+    def _take_levers(self, levers: FloatArray) -> None:
+        if np.array_equal(levers, self._levers):
+            return
+        n = len(levers)
+        self._levers[:] = levers
+        position, velocity, acceleration, _ = self._by_shift.reshape(4, n, n)
+        self._responses[:n] = position - levers[:, None] * acceleration
+        self._responses[n : 2 * n] = position
+        self._responses[2 * n] = position[-1] + math.sqrt(levers[-1]) * velocity[-1]
+        np.matmul(self._responses, self._responses.T, out=self._products)
 
-def sizes(config: PreviewConfig) -> tuple[QpSize, QpSize]:
-    """Sizes of the small and of the whole problem."""
-    whole = 8 * config.samples + 4
-    return tuple(  # type: ignore[return-value]
-        QpSize(variables=2 * config.samples + rows, rows=rows) for rows in (min(config.rows, whole), whole)
-    )
+    def _gram(self, problem: PreviewProblem, chosen: Indices) -> FloatArray:
+        """(k, k) products of the responses of rows, with their softness."""
+        point, normals = chosen >> 2, problem.normals[chosen]
+        gram = np.matmul(normals, normals.T)
+        gram *= self._products[point][:, point]
+        gram.reshape(-1)[:: len(chosen) + 1] += self._softness[chosen]
+        return gram
+
+    def _move(
+        self, problem: PreviewProblem, optimum: FloatArray, chosen: Indices, multiplier: FloatArray
+    ) -> None:
+        """Put the path at the unconstrained optimum plus the responses of rows, and evaluate it."""
+        pull = multiplier[:, None] * problem.normals[chosen]
+        shift = self._responses[chosen >> 2].T @ pull
+        np.matmul(self._by_shift, shift, out=problem.path)
+        np.subtract(optimum, problem.path, out=problem.path)
+        problem.evaluate()
 
 
 class _Stage:
     """One solver and its problem."""
 
-    def __init__(self, solver: Solver, size: QpSize) -> None:
-        self.solver, self._count = solver, size.rows
-        self._problem = QpProblem.empty(size)
-        n = size.variables - size.rows
-        self._x, self._y = self._problem.matrix[:, : n // 2], self._problem.matrix[:, n // 2 : n]
-        self._slack = self._problem.matrix.reshape(-1)[n :: size.variables + 1]
+    def __init__(self, solver: Solver, count: int) -> None:
+        self.solver, self._count = solver, count
+        self._problem = QpProblem.empty(QpSize(variables=count, rows=count))
 
-    def choose(self, near: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.int64]] | None:
+    def choose(self, residuals: FloatArray) -> Indices | None:
         """Rows with the smallest residuals; None when more are met than fit."""
-        if self._count >= len(near):
-            return np.arange(len(near))
-        chosen = np.argpartition(near, self._count)
-        if near[chosen[self._count]] <= 0.0:
-            return None
-        return chosen[: self._count]
+        if self._count == len(residuals):
+            return np.arange(self._count)
+        order = np.argpartition(residuals, self._count)
+        return None if residuals[order[self._count]] <= 0.0 else order[: self._count]
 
-    def solve(
-        self,
-        program: PreviewProgram,
-        rows: Rows,
-        free: FloatArray,
-        chosen: np.ndarray[tuple[int], np.dtype[np.int64]],
-    ) -> QpSolution:
-        """Solve on the chosen rows."""
+    def solve(self, gram: FloatArray, free: FloatArray) -> tuple[int, FloatArray | None]:
+        """Iterations, and the (k,) multipliers of the rows in 1/m; None without an answer."""
         problem = self._problem
-        responses = program.responses[chosen >> 2]
-        normals = rows.normals.reshape(-1, 2)[chosen]
-        np.multiply(responses, normals[:, :1], out=self._x)
-        np.multiply(responses, normals[:, 1:], out=self._y)
-        np.negative(program.softness[chosen], out=self._slack)
-        np.divide(free[chosen], _UNIT, out=problem.upper)
+        try:
+            problem.matrix[:] = np.linalg.cholesky(gram)
+        except np.linalg.LinAlgError:
+            return 0, None
+        np.multiply(free, 1.0 / _UNIT, out=problem.upper)
         solution = self.solver.solve(problem)
-        if solution.status is QpStatus.SOLVED and not np.isfinite(solution.x).all():
-            return QpSolution(x=solution.x, status=QpStatus.FAILED, iterations=solution.iterations)
-        return solution
-
-
-def _moved(rows: Rows, values: FloatArray) -> FloatArray:
-    """(8n + 4,) m, how far points move outward along the rows."""
-    moved = rows.normals[:, :, 0] * values[:, :1]
-    moved += rows.normals[:, :, 1] * values[:, 1:]
-    return moved.reshape(-1)
+        if not solution.ok:
+            return solution.iterations, None
+        given = solution.row_multiplier
+        multiplier = np.linalg.solve(problem.matrix.T, -solution.x) if given is None else given
+        usable = math.isfinite(float(multiplier.sum()))
+        return solution.iterations, multiplier * _UNIT if usable else None
