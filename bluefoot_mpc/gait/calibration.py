@@ -36,6 +36,8 @@ class Rhythm:
         apex: largest y2 of the cycle.
         swing_time: share of the swing's time passed at equal shares of its angle.
         stance_time: the same for stance.
+        rear_stance_time: the same for the stance of hind legs, which a walk paces otherwise.
+        lag: (4,) lags of lift-off behind the leader, fractions of the cycle in [-1/4, 3/4).
     """
 
     matrix: Matrix
@@ -45,6 +47,8 @@ class Rhythm:
     apex: float
     swing_time: tuple[float, ...]
     stance_time: tuple[float, ...]
+    rear_stance_time: tuple[float, ...]
+    lag: tuple[float, ...]
 
     def progress(self, y1: float, y2: float) -> tuple[bool, float]:
         """Whether a leg swings, and the share of that part's time passed, in [0, 1]."""
@@ -55,6 +59,17 @@ class Rhythm:
         low = table[index]
         return swing, low + (place - index) * (table[index + 1] - low)
 
+    def phase(self, leg: int, y1: float, y2: float) -> float:
+        """Share of the cycle's time since the leg's lift-off, in [0, 1]."""
+        if leg < 2 or y2 > 0.0:
+            swing, part = self.progress(y1, y2)
+            return self.share * part if swing else self.share + (1.0 - self.share) * part
+        place = angle_fraction(y1, y2)[1] * TABLE
+        index = min(TABLE - 1, int(place))
+        low = self.rear_stance_time[index]
+        part = low + (place - index) * (self.rear_stance_time[index + 1] - low)
+        return self.share + (1.0 - self.share) * part
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class LimitCycle:
@@ -63,12 +78,10 @@ class LimitCycle:
     Attributes:
         rhythm: what the gait needs at run time.
         start: state at the leader's lift-off.
-        lag: (4,) lags of lift-off behind the leader, fractions of the cycle.
     """
 
     rhythm: Rhythm
     start: CpgState
-    lag: tuple[float, ...]
 
 
 @functools.lru_cache(maxsize=64)
@@ -119,12 +132,13 @@ def measure(coupling: Coupling, gain: float, alpha: float, config: CpgConfig) ->
     period = end - begin
     falls = _crossing(-lead_y2)
     down = falls[(falls > begin) & (falls < end)][0]
-    lags = tuple(float(((times[-1] - begin) / period) % 1.0) for times in lift)
+    lags = tuple(float(((times[-1] - begin) / period + 0.25) % 1.0) - 0.25 for times in lift)
     first = rises[-2]
     blend = begin - first
     start = (1.0 - blend) * states[first] + blend * states[first + 1]
     start[4:][np.abs(start[4:]) < 1e-3] = 0.0  # the leader, and whoever lifts with it
     a, b, c, d, e, f, g, h = start.tolist()
+    rear = 3 - coupling.leader
     rhythm = Rhythm(
         matrix=matrix,
         alpha=alpha,
@@ -133,8 +147,10 @@ def measure(coupling: Coupling, gain: float, alpha: float, config: CpgConfig) ->
         apex=float(lead_y2[first:].max()),
         swing_time=_time_table(states, coupling.leader, begin, down),
         stance_time=_time_table(states, coupling.leader, down, end),
+        rear_stance_time=_time_table(states, rear, *_last_stance(states[:, 4 + rear])),
+        lag=lags,
     )
-    return LimitCycle(rhythm=rhythm, start=CpgState(y1=(a, b, c, d), y2=(e, f, g, h)), lag=lags)
+    return LimitCycle(rhythm=rhythm, start=CpgState(y1=(a, b, c, d), y2=(e, f, g, h)))
 
 
 def mix(first: Rhythm, second: Rhythm, weight: float) -> Rhythm:
@@ -151,6 +167,8 @@ def mix(first: Rhythm, second: Rhythm, weight: float) -> Rhythm:
         apex=blend(first.apex, second.apex),
         swing_time=tuple(map(blend, first.swing_time, second.swing_time)),
         stance_time=tuple(map(blend, first.stance_time, second.stance_time)),
+        rear_stance_time=tuple(map(blend, first.rear_stance_time, second.rear_stance_time)),
+        lag=tuple(map(blend, first.lag, second.lag)),
     )
 
 
@@ -172,6 +190,13 @@ def _crossing(values: FloatArray) -> FloatArray:
     """Sample numbers, with fractions, at which `values` becomes positive."""
     k = np.flatnonzero((values[:-1] <= 0.0) & (values[1:] > 0.0))
     return np.asarray(k + values[k] / (values[k] - values[k + 1]))
+
+
+def _last_stance(y2: FloatArray) -> tuple[float, float]:
+    """Sample numbers, with fractions, at which the last whole stance of a leg begins and ends."""
+    lift, down = _crossing(y2), _crossing(-y2)
+    end = lift[-1]
+    return float(down[down < end][-1]), float(end)
 
 
 def _time_table(states: FloatArray, leg: int, begin: float, end: float) -> tuple[float, ...]:

@@ -8,16 +8,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.gait.ahead import LookAhead
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.engine import GaitEngine
-from bluefoot_mpc.gait.footholds import Stride, early_contact, freeze, virtual_foothold
+from bluefoot_mpc.gait.footholds import Stride, early_contact, freeze
+from bluefoot_mpc.gait.motion import FootMotion, feet_ahead
 from bluefoot_mpc.gait.parameters import NO_STYLE, Basis, Style
 from bluefoot_mpc.gait.reflex import IDLE, ReflexOutput, is_quiet, reflex
+from bluefoot_mpc.gait.rollout import RolledAhead, roll_out
 from bluefoot_mpc.gait.state import GaitInputs, GaitOutput, GaitState
 from bluefoot_mpc.gait.transition import place_of
 from bluefoot_mpc.types import BoolArray, ContactSchedule, FloatArray, GaitPhase
 
-__all__ = ["Gait", "GaitConfig", "GaitInputs", "GaitOutput", "Style"]
+__all__ = ["FootMotion", "Gait", "GaitConfig", "GaitInputs", "GaitOutput", "Style"]
 
 
 class Gait:
@@ -42,11 +45,15 @@ class Gait:
         nominal = tuple(complex(x, y) for x, y, _ in feet.tolist())
         basis = Basis(foothold=config.foothold, nominal=nominal, style=style or NO_STYLE)
         self._engine = GaitEngine(config, basis)
+        self._ahead = LookAhead(self._engine)
+        self._rolled = RolledAhead(self._engine)
         self.reset()
 
     def reset(self) -> None:
         """Stand at the origin with every foot at its nominal place."""
         self.state = self._engine.rest()
+        self._elapsed = 0.0
+        self._rolled.forget()
 
     def step(self, inputs: GaitInputs, dt: float) -> GaitOutput:
         """Advance by one tick.
@@ -66,35 +73,38 @@ class Gait:
         estimates = _estimates(inputs.foot_position)
         state.reflex = self._reflex(state, inputs, contact, estimates)
         stride = self._engine.advance(state, dt)
+        self._elapsed += dt
         if state.walking and stride is not None:
             self._check_contacts(state, contact, estimates, stride)
         return self._output(state)
 
-    def schedule(self, horizon: float, dt: float) -> ContactSchedule:
-        """Roll the gait forward under the present command; the live state stays untouched.
+    def schedule(self, horizon: float, dt: float, *, exact: bool = False) -> ContactSchedule:
+        """Contacts ahead under the present command; the live state stays untouched.
+
+        In closed form while the gait goes on as it is. Between two gaits, and on
+        the way to rest, the network itself is rolled forward, and what that
+        found serves for `ROLL_AGAIN` seconds.
 
         Args:
             horizon: s.
             dt: s between samples; the first lies one `dt` ahead.
+            exact: roll the network forward in any case, and now.
 
         Returns:
             Contacts, and footholds in the b' of now: where each foot stands, or
-            will stand next.
+            will stand next. Its arrays are the caller's, except `time`.
         """
-        state = self.state.copy()
-        state.reflex = IDLE
-        count = max(1, round(horizon / dt))
-        stance = np.empty((count, 4), dtype=np.bool_)
-        places = np.empty((count, 4, 3))
-        last = None
-        for k in range(count):
-            last = self._engine.advance(state, dt)
-            for leg, foot in enumerate(state.feet):
-                stance[k, leg] = not foot.swinging
-                point = self.state.pose.to_local(foot.anchor)
-                places[k, leg] = (point.real, point.imag, foot.z)
-        self._fill_swings(state, stance, places, last)
-        return ContactSchedule(time=np.arange(1, count + 1) * np.float64(dt), stance=stance, footholds=places)
+        if exact:
+            return roll_out(self._engine, self.state, horizon, dt)
+        plan = self._ahead.schedule(self.state, horizon, dt)
+        if plan is None:
+            return self._rolled.schedule(self.state, self._elapsed, horizon, dt)
+        self._rolled.forget()
+        return plan
+
+    def feet_ahead(self, lead: float = 0.0) -> FootMotion:
+        """Planned feet with velocity and acceleration, `lead` seconds from now; see `motion`."""
+        return feet_ahead(self.state, lead, self.config.foothold)
 
     def set_footholds(self, footholds: FloatArray, given: Sequence[bool] | BoolArray) -> None:
         """Replace the places where feet land next.
@@ -177,31 +187,6 @@ class Gait:
                 height = None if estimate is None else estimate[1]
                 if early_contact(foot, contact[leg], progress, height, self.config.foothold):
                     freeze(foot, estimate, stride, self.config.foothold)
-
-    def _fill_swings(
-        self, state: GaitState, stance: BoolArray, places: FloatArray, last: Stride | None
-    ) -> None:
-        """Give samples in swing the place where the foot lands next (changes `places`)."""
-        for leg, foot in enumerate(state.feet):
-            landing = places[-1, leg].copy()
-            if foot.swinging and last is not None:
-                point, height = self._landing(state, leg, last)
-                landing[:] = (point.real, point.imag, height)
-            for k in range(len(stance) - 1, -1, -1):
-                if stance[k, leg]:
-                    landing = places[k, leg]
-                else:
-                    places[k, leg] = landing
-
-    def _landing(self, state: GaitState, leg: int, stride: Stride) -> tuple[complex, float]:
-        """Where a foot in swing will land: place in the live b' and height, m."""
-        foot = state.feet[leg]
-        if foot.goal is not None:
-            return self.state.pose.to_local(foot.goal), foot.goal_z
-        progress = state.rhythm.progress(state.cpg.y1[leg], state.cpg.y2[leg])[1]
-        later = state.pose.moved(state.velocity, state.yaw_rate, (1.0 - progress) * stride.swing_time)
-        goal = later.to_world(virtual_foothold(foot, stride))
-        return self.state.pose.to_local(goal), foot.offset_z
 
     def _output(self, state: GaitState) -> GaitOutput:
         rhythm, (y1, y2), pose, share = state.rhythm, state.cpg, state.pose, state.rhythm.share

@@ -16,6 +16,28 @@ def smooth_step(s: float) -> float:
     return s * s * s * (10.0 - s * (15.0 - 6.0 * s))
 
 
+def smooth_slope(s: float) -> float:
+    """First derivative of `smooth_step`."""
+    return 30.0 * (s * (1.0 - s)) ** 2
+
+
+def smooth_bend(s: float) -> float:
+    """Second derivative of `smooth_step`."""
+    return 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+
+
+def lift_motion(s: float, apex: float) -> tuple[float, float, float]:
+    """`lift_profile` with its first and second derivative."""
+    if s <= 0.0 or s >= 1.0:
+        return 0.0, 0.0, 0.0
+    if s < apex:
+        u = s / apex
+        return smooth_step(u), smooth_slope(u) / apex, smooth_bend(u) / (apex * apex)
+    left = 1.0 - apex
+    u = (1.0 - s) / left
+    return smooth_step(u), -smooth_slope(u) / left, smooth_bend(u) / (left * left)
+
+
 def lift_profile(s: float, apex: float) -> float:
     """Height over step height: up by one quintic until `apex`, down by another.
 

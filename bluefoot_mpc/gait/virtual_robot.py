@@ -9,6 +9,11 @@ from __future__ import annotations
 import cmath
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+ComplexArray = NDArray[np.complex128]
+
 
 class VirtualPose(NamedTuple):
     """Pose of the virtual robot in the world of the odometry start.
@@ -28,6 +33,11 @@ class VirtualPose(NamedTuple):
     def to_local(self, point: complex) -> complex:
         """A point of the world in b' coordinates."""
         return (point - self.centre) * cmath.rect(1.0, -self.yaw)
+
+    def from_frame(self, other: VirtualPose, points: ComplexArray) -> ComplexArray:
+        """Points in the b' of `other`, any shape, m, in this b'."""
+        shift = (other.centre - self.centre) * cmath.rect(1.0, -self.yaw)
+        return np.asarray(shift + cmath.rect(1.0, other.yaw - self.yaw) * points)
 
     def moved(self, velocity: complex, yaw_rate: float, dt: float) -> VirtualPose:
         """The pose after a constant twist, integrated exactly.

@@ -171,7 +171,7 @@ def test_start_is_on_the_limit_cycle_at_the_first_lift_off() -> None:
         assert max(cycle.start.y2) == 0.0
         assert cycle.start.y2[gait.leader] == 0.0
         assert cycle.start.y1[gait.leader] < 0.0
-        assert circular(cycle.lag, gait.lag) < 0.03
+        assert circular(cycle.rhythm.lag, gait.lag) < 0.03
 
 
 def test_progress_is_linear_in_time() -> None:

@@ -17,7 +17,7 @@ def test_schedule_is_what_happens_later(gait: str, law: str, before: float) -> N
     drive(walker, inputs, before)
     walker.step(inputs, DT)
     kept = copy.deepcopy(walker.state)
-    plan = walker.schedule(2.0, DT)
+    plan = walker.schedule(2.0, DT, exact=True)
     assert walker.state == kept
     pose = walker.state.pose
     run = drive(walker, inputs, 2.0)
@@ -32,7 +32,7 @@ def test_schedule_names_the_next_foothold_of_a_swinging_foot() -> None:
     walker = make()
     inputs = command(0.08)
     drive(walker, inputs, 3.0)
-    plan = walker.schedule(3.0, DT)
+    plan = walker.schedule(3.0, DT, exact=True)
     for leg in range(4):
         stance = plan.stance[:, leg]
         changes = np.flatnonzero(np.abs(np.diff(plan.footholds[:, leg, 0])) > 1e-9)
@@ -49,20 +49,20 @@ def test_a_swing_that_does_not_end_within_the_horizon_is_predicted() -> None:
     drive(walker, inputs, 3.0)
     while not walker.step(inputs, DT).phase.swing[0]:
         pass
-    short = walker.schedule(2 * DT, DT)
-    long = walker.schedule(1.0, DT)
+    short = walker.schedule(2 * DT, DT, exact=True)
+    long = walker.schedule(1.0, DT, exact=True)
     assert not short.stance[-1, 0]
     np.testing.assert_allclose(short.footholds[-1, 0], long.footholds[0, 0], atol=0.002)
 
 
 def test_schedule_at_rest_and_while_stopping() -> None:
     walker = make()
-    plan = walker.schedule(1.0, DT)
+    plan = walker.schedule(1.0, DT, exact=True)
     assert plan.stance.all()
     np.testing.assert_array_equal(plan.footholds, np.broadcast_to(STANCE, (50, 4, 3)))
     drive(walker, command(0.05), 2.0)
     walker.step(command(), DT)
-    plan = walker.schedule(3.0, DT)
+    plan = walker.schedule(3.0, DT, exact=True)
     assert plan.stance[-1].all()
     run = drive(walker, command(), 3.0)
     np.testing.assert_array_equal(plan.stance, ~run.swing)
