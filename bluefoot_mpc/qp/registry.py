@@ -41,9 +41,37 @@ def _proxsuite(size: QpSize, options: SolverOptions) -> Solver:
     return ProxsuiteSolver(size, options)
 
 
+def _general(name: str) -> _Maker:
+    def make(size: QpSize, options: SolverOptions) -> Solver:
+        from bluefoot_mpc.qp.backends.general import GeneralSolver  # noqa: PLC0415
+
+        return GeneralSolver(name, size, options)
+
+    return make
+
+
+def _conic(plugin: str) -> _Maker:
+    def make(size: QpSize, options: SolverOptions) -> Solver:
+        from bluefoot_mpc.qp.backends.conic import ConicSolver  # noqa: PLC0415
+
+        return ConicSolver(plugin, size, options)
+
+    return make
+
+
 _ENTRIES = {
     "daqp": _Entry(make=_daqp, module="daqp", package="daqp"),
     "proxsuite": _Entry(make=_proxsuite, module="proxsuite", package="proxsuite"),
+    "quadprog": _Entry(make=_general("quadprog"), module="quadprog", package="quadprog"),
+    "osqp": _Entry(make=_general("osqp"), module="osqp", package="osqp"),
+    "piqp": _Entry(make=_general("piqp"), module="piqp", package="piqp"),
+    "clarabel": _Entry(make=_general("clarabel"), module="clarabel", package="clarabel"),
+    "highs": _Entry(make=_general("highs"), module="highspy", package="highspy"),
+    "scs": _Entry(make=_general("scs"), module="scs", package="scs"),
+    **{
+        f"casadi-{plugin}": _Entry(make=_conic(plugin), module="casadi", package="casadi")
+        for plugin in ("qrqp", "qpoases", "osqp", "daqp", "highs", "proxqp")
+    },
 }
 
 SOLVERS: tuple[str, ...] = tuple(_ENTRIES)
