@@ -21,8 +21,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+from bluefoot_mpc.evaluation.batteries import BATTERIES, battery
 from bluefoot_mpc.evaluation.battery import Store, Verdict, run_battery, source_hash
-from bluefoot_mpc.evaluation.cases import BATTERIES, battery
 from bluefoot_mpc.evaluation.tables import (
     as_plain,
     limits_table,

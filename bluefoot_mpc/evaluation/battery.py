@@ -13,7 +13,8 @@ from pathlib import Path
 import orjson
 
 import bluefoot_mpc
-from bluefoot_mpc.evaluation.cases import Case, Limit
+from bluefoot_mpc.evaluation.cases import Case
+from bluefoot_mpc.evaluation.limits import Limit
 from bluefoot_mpc.evaluation.measure import Figures, measure
 from bluefoot_mpc.model.resources import models_folder
 
@@ -30,21 +31,21 @@ class Verdict:
     case: Case
     figures: dict[int, Figures]
 
-    def worst(self, limit: Limit) -> float | None:
-        """The seed's value that is nearest to breaking the limit, or breaks it."""
-        values = [figures.get(limit.figure) for figures in self.figures.values()]
-        known = [value for value in values if value is not None]
-        if len(known) < len(values) or not known:
-            return None
-        return max(known) if limit.side == "max" else min(known)
+    def values(self, figure: str) -> list[float | None]:
+        """A figure of every seed; None where it is unknown."""
+        return [figures.get(figure) for figures in self.figures.values()]
+
+    def value(self, limit: Limit) -> float | None:
+        """What of the seeds is compared with the limit; None where that is unknown."""
+        return limit.value(self.values(limit.figure))
 
     def holds(self, limit: Limit) -> bool:
-        """True when every seed keeps the limit."""
-        return limit.holds(self.worst(limit))
+        """True when the seeds keep the limit."""
+        return limit.holds(self.values(limit.figure))
 
     @property
     def passed(self) -> bool:
-        """True when every seed keeps every limit."""
+        """True when every limit is kept."""
         return all(self.holds(limit) for limit in self.case.limits)
 
 
@@ -86,7 +87,8 @@ class Store:
 
     def _key(self, case: Case, seed: int) -> str:
         options = orjson.dumps(dict(case.options), option=orjson.OPT_SORT_KEYS).decode()
-        return f"{self._version} {case.scenario} {options} {seed}"
+        turned = f" of {case.directions}" if case.directions else ""
+        return f"{self._version} {case.scenario} {options} {seed}{turned}"
 
 
 def source_hash() -> str:

@@ -15,6 +15,9 @@ WALKING_COLUMNS = {
 }  # fmt: skip
 """Figures that the walking table shows, and their titles."""
 
+WALKING_BATTERIES = ("mpc trot", "mpc walk", "walking")
+"""Batteries that are shown as tables of walking."""
+
 _LEAST_IS_WORST = ("clearance_mm",)
 
 
@@ -44,7 +47,8 @@ def as_plain(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
                     {
                         "figure": limit.figure,
                         "limit": limit.describe(),
-                        "worst": verdict.worst(limit),
+                        "over": limit.over,
+                        "value": verdict.value(limit),
                         "holds": verdict.holds(limit),
                     }
                     for limit in case.limits
@@ -68,12 +72,12 @@ def walking_table(verdicts: Sequence[Verdict]) -> str:
 
 
 def limits_table(verdicts: Sequence[Verdict]) -> str:
-    """Markdown table, one row a limit: what is asked, and the worst seed."""
-    lines = ["| case | figure | limit | worst seed | kept |", "|---|---|---|---|---|"]
+    """Markdown table, one row a limit: what is asked, and what was reached."""
+    lines = ["| case | figure | limit | reached | kept |", "|---|---|---|---|---|"]
     for verdict in verdicts:
         for limit in verdict.case.limits:
-            worst = verdict.worst(limit)
-            shown = "unknown" if worst is None else f"{worst:.3g}"
+            reached = verdict.value(limit)
+            shown = "unknown" if reached is None else f"{reached:.3g}"
             kept = "yes" if verdict.holds(limit) else "NO"
             lines.append(f"| {verdict.case.name} | {limit.figure} | {limit.describe()} | {shown} | {kept} |")
     return "\n".join(lines)
@@ -84,20 +88,21 @@ def battery_line(name: str, verdicts: Sequence[Verdict]) -> str:
     runs = [figures for verdict in verdicts for figures in verdict.figures.values()]
     falls = sum(figures.get("falls") or 0.0 for figures in runs)
     parts = [f"{len(runs)} runs, {falls:.0f} falls"]
-    limits = {limit.figure: limit for verdict in verdicts for limit in verdict.case.limits}
-    for figure, limit in limits.items():
-        values = [figures.get(figure) for figures in runs]
-        known = [value for value in values if value is not None]
-        if figure != "falls" and known and len(known) == len(values):
-            worst = max(known) if limit.side == "max" else min(known)
-            parts.append(f"{figure} at worst {worst:.2f} (limit {limit.describe()})")
+    limits = dict.fromkeys(limit for verdict in verdicts for limit in verdict.case.limits)
+    for limit in limits:
+        worst = limit.value([figures.get(limit.figure) for figures in runs])
+        same_for_all = all(limit in verdict.case.limits for verdict in verdicts)
+        if limit.figure != "falls" and limit.over == "worst" and same_for_all and worst is not None:
+            parts.append(f"{limit.figure} at worst {worst:.2f} (limit {limit.describe()})")
     return f"- {name}: {', '.join(parts)}"
 
 
 def readme_section(batteries: Mapping[str, Sequence[Verdict]]) -> str:
-    """What the README shows of the figures: the walking table and a line for each other battery."""
-    parts = [walking_table(batteries["walking"])] if "walking" in batteries else []
-    lines = [battery_line(name, verdicts) for name, verdicts in batteries.items() if name != "walking"]
+    """What the README shows of the figures: tables of the straight walks, a line for each other battery."""
+    parts = [walking_table(batteries[name]) for name in WALKING_BATTERIES if name in batteries]
+    lines = [
+        battery_line(name, verdicts) for name, verdicts in batteries.items() if name not in WALKING_BATTERIES
+    ]
     return "\n\n".join([*parts, "\n".join(lines)]).strip()
 
 

@@ -1,8 +1,10 @@
 import pytest
 
 from bluefoot_mpc.evaluation import battery as battery_module
+from bluefoot_mpc.evaluation.batteries import BATTERIES, battery
 from bluefoot_mpc.evaluation.battery import Store, Verdict, run_battery
-from bluefoot_mpc.evaluation.cases import BATTERIES, Case, Limit, battery
+from bluefoot_mpc.evaluation.cases import Case
+from bluefoot_mpc.evaluation.limits import Limit
 from bluefoot_mpc.evaluation.tables import (
     as_plain,
     battery_line,
@@ -61,7 +63,7 @@ def test_other_code_or_other_options_make_old_results_worthless(calls, tmp_path,
 
 def test_the_worst_seed_decides():
     verdict = Verdict(case=CASE, figures={seed: made_up(CASE, seed) for seed in CASE.seeds})
-    assert verdict.worst(CASE.limits[1]) == 7.0
+    assert verdict.value(CASE.limits[1]) == 7.0
     assert not verdict.passed
     kept = Verdict(case=CASE, figures={0: made_up(CASE, 0)})
     assert kept.passed

@@ -1,0 +1,35 @@
+"""The batteries by name: what ``make figures`` measures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from bluefoot_mpc.evaluation import law_cases, model_cases
+from bluefoot_mpc.evaluation.cases import Case
+from bluefoot_mpc.exceptions import UnknownNameError
+
+BATTERIES: dict[str, Callable[[], tuple[Case, ...]]] = {
+    "walking": law_cases.walking_cases,
+    "estimation": law_cases.estimation_cases,
+    "pushes": law_cases.push_cases,
+    "transitions": law_cases.transition_cases,
+    "other robots": law_cases.other_robot_cases,
+    "robustness": law_cases.robustness_cases,
+    "mpc trot": model_cases.trot_cases,
+    "mpc walk": model_cases.slow_walk_cases,
+    "mpc disturbed": model_cases.disturbed_cases,
+    "mpc pushes": model_cases.push_battery,
+    "mpc manoeuvres": model_cases.manoeuvre_cases,
+}
+"""Each function gives the cases of its battery."""
+
+
+def battery(name: str) -> tuple[Case, ...]:
+    """The cases of a battery.
+
+    Raises:
+        UnknownNameError: there is no such battery.
+    """
+    if name not in BATTERIES:
+        raise UnknownNameError("battery", name, BATTERIES)
+    return BATTERIES[name]()
