@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
+from bluefoot_mpc.control.ground import GroundAdaptationConfig
 from bluefoot_mpc.control.modes import ModeConfig
 from bluefoot_mpc.control.posture import PostureConfig
 from bluefoot_mpc.control.servo_map import ServoMapConfig
@@ -12,6 +14,7 @@ from bluefoot_mpc.estimation.config import EstimatorConfig
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.model.legs.ankle import AnkleConfig
 from bluefoot_mpc.zmp.placement import PlacementConfig
+from bluefoot_mpc.zmp.preview import PreviewConfig
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -22,7 +25,10 @@ class ControlConfig:
     gait: GaitConfig = field(default_factory=GaitConfig)
     posture: PostureConfig = field(default_factory=PostureConfig)
     ankle: AnkleConfig = field(default_factory=lambda: AnkleConfig(policy="margin"))
+    sway: Literal["static", "preview"] = "static"  # the paper's placement law, or ZMP preview
     zmp: PlacementConfig = field(default_factory=PlacementConfig)
+    preview: PreviewConfig = field(default_factory=PreviewConfig)
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
+    ground: GroundAdaptationConfig = field(default_factory=GroundAdaptationConfig)
     servo: ServoMapConfig = field(default_factory=ServoMapConfig)
     modes: ModeConfig = field(default_factory=ModeConfig)

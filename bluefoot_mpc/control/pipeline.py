@@ -14,9 +14,13 @@ import numpy as np
 from bluefoot_mpc.control import load_share, modes, posture, servo_map, tracking
 from bluefoot_mpc.control.command import usable
 from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.control.ground import GroundAdapter
+from bluefoot_mpc.control.leg_masses import LegMasses
 from bluefoot_mpc.control.planned_body import PlannedBody
+from bluefoot_mpc.control.preview_sway import PreviewSway
+from bluefoot_mpc.control.sway import Sway
 from bluefoot_mpc.control.targets import JointTargets
-from bluefoot_mpc.control.trunk import TrunkPlanner
+from bluefoot_mpc.control.trunk import Footing, JointsInStance, TrunkPlanner
 from bluefoot_mpc.estimation.estimator import Estimator
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.gait.gait import Gait, GaitInputs, GaitOutput
@@ -59,16 +63,17 @@ class Pipeline:
     def __init__(self, robot: RobotModel, config: ControlConfig, period: float) -> None:
         self.config = config
         self.period = period
+        self._robot = robot
         geometry = robot.geometry
         stance = posture.stance(robot.parameters.stance, config.posture)
         imu = replace(config.estimator.imu, mount=robot.parameters.sensors.imu)
         self._estimator = Estimator(geometry, replace(config.estimator, imu=imu))
-        self._gait = Gait(config.gait, stance.feet)
+        self._gait = Gait(config.gait, stance.feet, posture.style(stance, config.posture, config.servo))
         self._targets = JointTargets(geometry, config.ankle)
-        self._trunk = TrunkPlanner(robot.parameters, stance, config.posture, config.zmp, self._targets.reach)
-        self._robot = robot
+        self._trunk = TrunkPlanner(stance, config.posture, self._sway, self._targets.reach)
         self._dynamics = Dynamics(robot)
         self._body = PlannedBody(geometry)
+        self._ground = GroundAdapter(config.ground)
         self._require_reachable()
         self.reset()
 
@@ -79,6 +84,7 @@ class Pipeline:
         self._trunk.reset()
         self._targets.reset()
         self._body.reset()
+        self._ground.reset()
         self._modes = modes.ModeState()
         self._tracking = tracking.TrackingState()
         self._wanted = MotionCommand()
@@ -105,8 +111,10 @@ class Pipeline:
         twist = self._corrected(motion, estimate, upright)
         gait = self._gait.step(self._gait_inputs(twist, motion, estimate, upright), dt)
         self._walking = gait.phase.walking
-        reference, zmp, held = self._trunk.step(gait, motion, estimate, self._modes.sit_level, dt)
-        joints, cut = self._targets.step(reference, frame, dt)
+        gait = self._on_the_ground(gait, estimate, upright, dt)
+        footing = self._footing(estimate)
+        reference, zmp, held = self._trunk.step(gait, motion, estimate, footing, dt)
+        joints, cut = self._targets.step(reference, frame, dt, gait.style.ankle_shift)
         goals = self._fed_forward(gait, reference, joints, frame)
         command = JointCommand(
             position=goals, speed=np.zeros(N_JOINTS), torque_limit=np.full(N_JOINTS, self._modes.torque)
@@ -116,6 +124,12 @@ class Pipeline:
             reference=reference, zmp=zmp, events=begun + held + cut + changed,
         )  # fmt: skip
         return ControlOutput(command=command, telemetry=telemetry)
+
+    def _sway(self, joints_in_stance: JointsInStance) -> Sway | PreviewSway:
+        masses, config = LegMasses(self._robot.parameters), self.config
+        if config.sway == "preview":
+            return PreviewSway(masses, config.preview, joints_in_stance, self._gait.schedule)
+        return Sway(masses, config.zmp, joints_in_stance)
 
     def _rotation_base_to_virtual(self, estimate: BodyState) -> FloatArray:
         """(3, 3) rotation from the base frame to b': estimated tilt, commanded yaw of the trunk."""
@@ -173,19 +187,40 @@ class Pipeline:
         )
         return twist
 
+    def _footing(self, estimate: BodyState) -> Footing:
+        """How the robot stands; the preview plans with the joints as they are planned themselves."""
+        planned = self.config.sway == "preview" and self._targets.started
+        return Footing(
+            sit_level=self._modes.sit_level,
+            joints=self._body.q[7:] if planned else estimate.joint_position,
+            settled=self._targets.started,
+        )
+
+    def _on_the_ground(
+        self, gait: GaitOutput, estimate: BodyState, upright: FloatArray, dt: float
+    ) -> GaitOutput:
+        """The gait with its feet on the ground's slope."""
+        if not self.config.ground.enabled:
+            return gait
+        if estimate.healthy:
+            standing = estimate.contact & ~gait.phase.swing
+            self._ground.step(estimate.foot_position_in_base @ upright.T, standing, dt)
+        return replace(gait, foot_position=self._ground.place(gait.foot_position))
+
     def _fed_forward(
         self, gait: GaitOutput, reference: PostureReference, joints: FloatArray, frame: SensorFrame
     ) -> FloatArray:
-        config, robot = self.config.servo, self._robot
+        config, robot, style = self.config.servo, self._robot, gait.style
         self._body.step(reference, joints, self.period)
-        if config.mixing == config.back_emf == 0.0 or not self._targets.started:
+        if style.mixing == style.back_emf == 0.0 or not self._targets.started:
             return joints
         share = load_share.load_ramp(gait, 0.04)
         torque, _ = load_share.static_torques(self._dynamics, self._body.q, share)
         torque *= servo_map.derating(frame.joint_temperature, config)
         servo = robot.parameters.servo
         voltage = frame.voltage if frame.voltage_valid else servo.nominal_voltage
-        goals = servo_map.goals(servo, joints, self._body.joint_speed, torque, voltage, config)
+        feed = servo_map.Feed(torque=style.mixing * torque, speed=style.back_emf * self._body.joint_speed)
+        goals = servo_map.goals(servo, joints, feed, voltage, config)
         physical = robot.geometry
         return np.minimum(np.maximum(goals, physical.physical_lower), physical.physical_upper)
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bluefoot_mpc.control.servo_map import ServoMapConfig
+from bluefoot_mpc.gait.parameters import Style
 from bluefoot_mpc.model.parameters import StanceParameters
 from bluefoot_mpc.settings import require_nonnegative, require_positive
 from bluefoot_mpc.types import FloatArray, TrunkPose
@@ -70,11 +72,19 @@ def _follow(value: float, target: float, bound: float, step: float) -> float:
     return value + min(max(target - value, -step), step)
 
 
-def trim_level(trim: FloatArray, tilt_error: FloatArray, dt: float, config: PostureConfig) -> FloatArray:
-    """(2,) rad, slow integral of the tilt error (estimate minus reference), bounded."""
-    gain, bound = config.level_gain * dt, config.level_bound
+def trim_level(trim: FloatArray, tilt_error: FloatArray, gain: float, bound: float, dt: float) -> FloatArray:
+    """(2,) rad, slow integral of the tilt error (estimate minus reference), bounded.
+
+    Args:
+        trim: (2,) rad, roll and pitch so far.
+        tilt_error: (2,) rad.
+        gain: 1/s.
+        bound: rad, largest trim.
+        dt: s.
+    """
+    share = gain * dt
     pairs = zip(trim.tolist(), tilt_error.tolist(), strict=True)
-    return np.array([min(max(value - gain * error, -bound), bound) for value, error in pairs])
+    return np.array([min(max(value - share * error, -bound), bound) for value, error in pairs])
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -99,3 +109,11 @@ def stance(robot: StanceParameters, config: PostureConfig) -> Stance:
         trunk_height=config.trunk_height or robot.trunk_height,
     )
     return Stance(feet=chosen.foot_position, trunk_height=chosen.trunk_height)
+
+
+def style(stance: Stance, config: PostureConfig, servo: ServoMapConfig) -> Style:
+    """What holds for trunk and servos where the gait's table says nothing."""
+    return Style(
+        trunk_height=stance.trunk_height, trunk_forward=config.trunk_forward, level_gain=config.level_gain,
+        mixing=servo.mixing, back_emf=servo.back_emf,
+    )  # fmt: skip

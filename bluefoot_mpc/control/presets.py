@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.control.ground import GroundAdaptationConfig
 from bluefoot_mpc.control.servo_map import ServoMapConfig
 from bluefoot_mpc.exceptions import UnknownNameError
 
@@ -21,5 +22,8 @@ def preset(name: str) -> ControlConfig:
     if name == "cpg":
         return ControlConfig()
     if name == "mpc":
-        return ControlConfig(servo=ServoMapConfig(mixing=0.6, back_emf=1.0))
+        return ControlConfig(
+            ground=GroundAdaptationConfig(enabled=True),
+            servo=ServoMapConfig(mixing=0.6, back_emf=1.0),
+        )
     raise UnknownNameError("controller", name, CONTROLLERS)

@@ -44,24 +44,31 @@ def derating(temperature: FloatArray, config: ServoMapConfig) -> FloatArray:
     return np.where(np.isfinite(left), np.minimum(np.maximum(left, 0.0), 1.0), 1.0)
 
 
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Feed:
+    """What is fed forward.
+
+    Attributes:
+        torque: (16,) N·m at the output shafts.
+        speed: (16,) rad/s, whose back-EMF is made up for.
+    """
+
+    torque: FloatArray
+    speed: FloatArray
+
+
 def goals(
-    servo: ServoParameters,
-    joints: FloatArray,
-    speed: FloatArray,
-    torque: FloatArray,
-    voltage: float,
-    config: ServoMapConfig,
+    servo: ServoParameters, joints: FloatArray, feed: Feed, voltage: float, config: ServoMapConfig
 ) -> FloatArray:
-    """(16,) rad, goal positions that hold `joints` at a planned speed and torque.
+    """(16,) rad, goal positions at which servos make the fed torque at `joints`.
 
     Args:
         servo: parameters.
         joints: (16,) rad, planned angles.
-        speed: (16,) rad/s, planned speeds.
-        torque: (16,) N·m, planned torques at the output shafts.
+        feed: torque and speed.
         voltage: V at the servos; their stiffness is in proportion to it.
-        config: shares and bounds.
+        config: bounds.
     """
-    wanted = goal_for_torque(servo, joints, config.mixing * torque, config.back_emf * speed) - joints
+    wanted = goal_for_torque(servo, joints, feed.torque, feed.speed) - joints
     shift = wanted * (servo.nominal_voltage / voltage)
     return joints + np.minimum(np.maximum(shift, -config.max_shift), config.max_shift)

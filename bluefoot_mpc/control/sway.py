@@ -6,13 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from bluefoot_mpc.control.leg_masses import LegMasses
 from bluefoot_mpc.gait.gait import GaitOutput
-from bluefoot_mpc.geometry import rotation_from_rpy
-from bluefoot_mpc.model.legs import LegGeometry, joint_positions_in_base
-from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.types import BoolArray, FloatArray
 from bluefoot_mpc.zmp import placement
-from bluefoot_mpc.zmp.mass_points import lump
 from bluefoot_mpc.zmp.placement import PlacementConfig
 
 
@@ -28,34 +25,34 @@ class Sway:
         offset: (2,) m, the law's share of the trunk's place in b'.
 
     Args:
-        parameters: the robot.
+        masses: the robot's centre of mass by its joints.
         config: the law.
         joints_in_stance: (16,) rad, joints for a (6,) commanded pose over the nominal stance.
     """
 
     def __init__(
         self,
-        parameters: RobotParameters,
+        masses: LegMasses,
         config: PlacementConfig,
         joints_in_stance: Callable[[FloatArray], FloatArray],
     ) -> None:
-        self._geometry = LegGeometry.from_parameters(parameters)
-        self._masses = lump(parameters)
+        self._masses = masses
         self._config = config
         self._joints_in_stance = joints_in_stance
-        self._neutral_com = self._points_and_com(joints_in_stance(np.zeros(6)), None)[1]
+        self._masses.turn(np.zeros(3))
+        self._neutral_com = self._masses.com(joints_in_stance(np.zeros(6)))
         self.reset()
 
     def reset(self) -> None:
         """Back to the neutral place, without a commanded pose."""
         self.offset = np.zeros(2)
         self._commanded = np.zeros(2)
-        self._rotation: FloatArray | None = None
+        self._masses.turn(np.zeros(3))
 
     def follow(self, pose: FloatArray) -> None:
         """Take note of a change of the commanded pose, (6,) m and rad."""
-        self._rotation = rotation_from_rpy(pose[3:]) if pose[3:].any() else None
-        com = self._points_and_com(self._joints_in_stance(pose), self._rotation)[1]
+        self._masses.turn(pose[3:])
+        com = self._masses.com(self._joints_in_stance(pose))
         self._commanded = (com - self._neutral_com)[:2] if pose.any() else np.zeros(2)
 
     def step(self, gait: GaitOutput, joints: FloatArray, trunk: FloatArray, dt: float) -> FloatArray:
@@ -71,22 +68,12 @@ class Sway:
         if not config.enabled:
             return np.full(2, np.nan)
         # The law is quasi-static, and tilts that nobody commanded are small.
-        points, com = self._points_and_com(joints, self._rotation)
-        zmp = placement.static_zmp(self._masses, com, points, self._swing_ahead(gait))
+        points, com = self._masses.points_and_com(joints)
+        zmp = placement.static_zmp(self._masses.masses, com, points, self._swing_ahead(gait))
         force = placement.boundary_force(trunk, gait.foot_position, config)
         target = zmp + self.offset - self._commanded
-        self.offset = placement.advance(self.offset, target, force, self._masses, dt, config)
+        self.offset = placement.advance(self.offset, target, force, self._masses.masses, dt, config)
         return trunk[:2] + zmp
-
-    def _points_and_com(
-        self, joints: FloatArray, rotation: FloatArray | None
-    ) -> tuple[FloatArray, FloatArray]:
-        """(4, 5, 3) m, points of the legs, and (3,) m, centre of mass, from the trunk in axes of b'."""
-        points = joint_positions_in_base(self._geometry, joints)
-        trunk_com = self._masses.trunk_com
-        if rotation is not None:
-            points, trunk_com = points @ rotation.T, rotation @ trunk_com
-        return points, placement.centre_of_mass(self._masses, trunk_com, points)
 
     def _swing_ahead(self, gait: GaitOutput) -> BoolArray:
         """(4,) True where a leg will swing after the law's lead time, at the present rhythm."""

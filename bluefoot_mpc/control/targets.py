@@ -46,15 +46,20 @@ class JointTargets:
         """Whether the joints have left the posture in which they were found."""
         return self._elapsed >= START_TIME
 
-    def reach(self, reference: PostureReference) -> IkResult:
-        """Joints for a wanted trunk and feet, and what stands against them."""
+    def reach(self, reference: PostureReference, ankle_shift: float = 0.0) -> IkResult:
+        """Joints for a wanted trunk and feet, and what stands against them.
+
+        Args:
+            reference: wanted trunk and feet.
+            ankle_shift: rad, added to the ankle direction that the policy gives.
+        """
         rotation = rotation_from_rpy(reference.trunk_rpy)
         feet = (reference.foot_position - reference.trunk_position) @ rotation
         gamma = ankle_directions(self._geometry, self._ankle, feet, rotation[2], table=self._table)
-        return inverse(self._geometry, feet, gamma)
+        return inverse(self._geometry, feet, gamma + ankle_shift if ankle_shift else gamma)
 
     def step(
-        self, reference: PostureReference, frame: SensorFrame, dt: float
+        self, reference: PostureReference, frame: SensorFrame, dt: float, ankle_shift: float = 0.0
     ) -> tuple[FloatArray, tuple[str, ...]]:
         """(16,) rad, joint goals, and which limits began to cut them on this tick.
 
@@ -62,8 +67,9 @@ class JointTargets:
             reference: wanted trunk and feet.
             frame: where the joints are; only the first frame is used.
             dt: s.
+            ankle_shift: rad, added to the ankle direction that the policy gives.
         """
-        result = self.reach(reference)
+        result = self.reach(reference, ankle_shift)
         # Two ufuncs: np.clip takes three times as long on a few numbers.
         goal = np.minimum(np.maximum(result.joints, self._geometry.lower), self._geometry.upper)
         beyond = frozenset(violation.index for violation in result.violations)

@@ -4,19 +4,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from bluefoot_mpc.control import posture
 from bluefoot_mpc.control.posture import PostureConfig, Stance
+from bluefoot_mpc.control.preview_sway import PreviewSway
 from bluefoot_mpc.control.sway import Sway
 from bluefoot_mpc.gait.gait import GaitOutput
 from bluefoot_mpc.model.legs import IkResult
-from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.types import BodyState, BoolArray, FloatArray, MotionCommand, PostureReference
-from bluefoot_mpc.zmp.placement import PlacementConfig
+from bluefoot_mpc.zmp.preview import ComPlan
 
+JointsInStance = Callable[[FloatArray], FloatArray]
 _PLANTED: BoolArray = np.zeros(4, dtype=np.bool_)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Footing:
+    """How the robot stands on this tick.
+
+    Attributes:
+        sit_level: 0 stands, 1 sits.
+        joints: (16,) rad, for the legs' masses.
+        settled: False while the joints are still on their way from where they were found.
+    """
+
+    sit_level: float
+    joints: FloatArray
+    settled: bool = True
 
 
 class TrunkPlanner:
@@ -28,25 +45,23 @@ class TrunkPlanner:
         tilt_rate: (2,) rad/s, commanded angular velocity about x and y of b'.
 
     Args:
-        parameters: the robot.
         stance: nominal feet and height of the trunk.
         config: offsets, rates and trims.
-        zmp: the placement law.
+        sway: makes the law by which the trunk moves for balance.
         reach: inverse kinematics, to refuse poses that the legs cannot hold.
     """
 
     def __init__(
         self,
-        parameters: RobotParameters,
         stance: Stance,
         config: PostureConfig,
-        zmp: PlacementConfig,
+        sway: Callable[[JointsInStance], Sway | PreviewSway],
         reach: Callable[[PostureReference], IkResult],
     ) -> None:
         self._reach = reach
         self._stance = stance
         self._config = config
-        self._sway = Sway(parameters, zmp, lambda pose: reach(self.over_stance(pose)).joints)
+        self._sway = sway(self._joints_in_stance)
         self.reset()
 
     def reset(self) -> None:
@@ -59,8 +74,13 @@ class TrunkPlanner:
         self.yaw = 0.0
         self.tilt_rate = np.zeros(2)
 
+    @property
+    def plan(self) -> ComPlan | None:
+        """The preview's plan of the last tick; None without a preview."""
+        return self._sway.plan if isinstance(self._sway, PreviewSway) else None
+
     def step(
-        self, gait: GaitOutput, motion: MotionCommand, estimate: BodyState, sit_level: float, dt: float
+        self, gait: GaitOutput, motion: MotionCommand, estimate: BodyState, stand: Footing, dt: float
     ) -> tuple[PostureReference, FloatArray, tuple[str, ...]]:
         """The wanted trunk and feet, the (2,) ZMP that the placement law assumes, and events.
 
@@ -71,15 +91,16 @@ class TrunkPlanner:
             gait: feet in b' and the gait's phase.
             motion: the command, for the trunk offset.
             estimate: state estimate, for the level trim and the legs' masses.
-            sit_level: 0 stands, 1 sits.
+            stand: how far the robot sits, and its joints.
             dt: s.
         """
-        config = self._config
+        config, style = self._config, gait.style
         # A blind estimate goes on from its last attitude: integrating it would tilt the trunk for real.
-        if sit_level == 0.0 and estimate.healthy:
-            self._trim = posture.trim_level(self._trim, estimate.rpy[:2] - self._pose[3:5], dt, config)
-        zmp = self._sway.step(gait, estimate.joint_position, self.position, dt)
-        height = self._stance.trunk_height * (1.0 - sit_level * (1.0 - config.sit_height_share))
+        if stand.sit_level == 0.0 and stand.settled and estimate.healthy:
+            tilt = estimate.rpy[:2] - self._pose[3:5]
+            self._trim = posture.trim_level(self._trim, tilt, style.level_gain, config.level_bound, dt)
+        zmp = self._sway.step(gait, stand.joints, self.position, dt)
+        height = style.trunk_height * (1.0 - stand.sit_level * (1.0 - config.sit_height_share))
         before = self._pose
         events = self._follow(gait, motion, height, dt)
         if self._pose is not before:
@@ -98,6 +119,9 @@ class TrunkPlanner:
             foot_position=self._stance.feet,
             swing=_PLANTED,
         )
+
+    def _joints_in_stance(self, pose: FloatArray) -> FloatArray:
+        return self._reach(self.over_stance(pose)).joints
 
     def _follow(self, gait: GaitOutput, motion: MotionCommand, height: float, dt: float) -> tuple[str, ...]:
         """Move the offset towards the commanded one, as far as the legs can hold it."""
@@ -123,7 +147,7 @@ class TrunkPlanner:
         shift_x, shift_y = self._sway.offset.tolist()
         trim_roll, trim_pitch = self._trim.tolist()
         return PostureReference(
-            trunk_position=np.array([x + self._config.trunk_forward + shift_x, y + shift_y, z + height]),
+            trunk_position=np.array([x + gait.style.trunk_forward + shift_x, y + shift_y, z + height]),
             trunk_rpy=np.array([roll + trim_roll, pitch + trim_pitch, yaw]),
             foot_position=gait.foot_position,
             swing=gait.phase.swing,

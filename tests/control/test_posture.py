@@ -24,14 +24,14 @@ def test_the_pose_follows_at_limited_speed_and_inside_its_bounds():
 def test_the_trim_removes_a_constant_tilt():
     trim, disturbance = np.zeros(2), np.array([0.02, -0.015])
     for _ in range(3000):
-        trim = posture.trim_level(trim, disturbance + trim, 0.02, CONFIG)
+        trim = posture.trim_level(trim, disturbance + trim, CONFIG.level_gain, CONFIG.level_bound, 0.02)
     np.testing.assert_allclose(disturbance + trim, 0.0, atol=1e-4)
 
 
 def test_the_trim_is_bounded():
     trim = np.zeros(2)
     for _ in range(10000):
-        trim = posture.trim_level(trim, np.array([1.0, -1.0]), 0.02, CONFIG)
+        trim = posture.trim_level(trim, np.array([1.0, -1.0]), CONFIG.level_gain, CONFIG.level_bound, 0.02)
     np.testing.assert_allclose(np.abs(trim), CONFIG.level_bound)
 
 

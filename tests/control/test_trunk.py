@@ -5,9 +5,12 @@ import numpy as np
 import pytest
 
 from bluefoot_mpc.control import posture
+from bluefoot_mpc.control.leg_masses import LegMasses
 from bluefoot_mpc.control.posture import PostureConfig
+from bluefoot_mpc.control.servo_map import ServoMapConfig
+from bluefoot_mpc.control.sway import Sway
 from bluefoot_mpc.control.targets import JointTargets
-from bluefoot_mpc.control.trunk import TrunkPlanner
+from bluefoot_mpc.control.trunk import Footing, TrunkPlanner
 from bluefoot_mpc.gait.gait import Gait, GaitConfig, GaitInputs
 from bluefoot_mpc.geometry import rotation_from_rpy
 from bluefoot_mpc.model.legs import AnkleConfig
@@ -32,8 +35,11 @@ class Bench:
         config = config or PostureConfig()
         stance = posture.stance(robot.parameters.stance, config)
         self.targets = JointTargets(robot.geometry, AnkleConfig())
-        self.trunk = TrunkPlanner(robot.parameters, stance, config, zmp, self.targets.reach)
-        self.gait = Gait(GaitConfig(), stance.feet)
+        masses = LegMasses(robot.parameters)
+        self.trunk = TrunkPlanner(
+            stance, config, lambda joints: Sway(masses, zmp, joints), self.targets.reach
+        )
+        self.gait = Gait(GaitConfig(), stance.feet, posture.style(stance, config, ServoMapConfig()))
         self.joints = robot.stance_joints
         self.estimate = BodyState(
             time=0.0, position=np.zeros(3), quaternion=np.array([0.0, 0.0, 0.0, 1.0]), rpy=np.zeros(3),
@@ -48,7 +54,8 @@ class Bench:
             inputs = GaitInputs(velocity=np.array([velocity, 0.0]), gait=gait)
             seen = replace(self.estimate, joint_position=self.joints, **estimate)
             self.output = self.gait.step(inputs, DT)
-            self.reference, self.zmp, events = self.trunk.step(self.output, motion, seen, sit_level, DT)
+            footing = Footing(sit_level=sit_level, joints=self.joints)
+            self.reference, self.zmp, events = self.trunk.step(self.output, motion, seen, footing, DT)
             self.joints = self.targets.reach(self.reference).joints
             yield events
 
