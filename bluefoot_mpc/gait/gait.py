@@ -8,16 +8,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.gait.ahead import LookAhead
+from bluefoot_mpc.gait.ahead import LookAhead, leg_phases
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.engine import GaitEngine
-from bluefoot_mpc.gait.footholds import Stride, early_contact, freeze
+from bluefoot_mpc.gait.footholds import Foot, Stride, early_contact, freeze
 from bluefoot_mpc.gait.motion import FootMotion, feet_ahead
 from bluefoot_mpc.gait.parameters import NO_STYLE, Basis, Style
 from bluefoot_mpc.gait.reflex import IDLE, ReflexOutput, is_quiet, reflex
 from bluefoot_mpc.gait.rollout import RolledAhead, roll_out
 from bluefoot_mpc.gait.state import GaitInputs, GaitOutput, GaitState
 from bluefoot_mpc.gait.transition import place_of
+from bluefoot_mpc.gait.virtual_robot import VirtualPose
 from bluefoot_mpc.types import BoolArray, ContactSchedule, FloatArray, GaitPhase
 
 __all__ = ["FootMotion", "Gait", "GaitConfig", "GaitInputs", "GaitOutput", "Style"]
@@ -106,25 +107,46 @@ class Gait:
         """Planned feet with velocity and acceleration, `lead` seconds from now; see `motion`."""
         return feet_ahead(self.state, lead, self.config.foothold)
 
-    def set_footholds(self, footholds: FloatArray, given: Sequence[bool] | BoolArray) -> None:
+    def set_footholds(self, footholds: FloatArray, given: Sequence[bool] | BoolArray) -> BoolArray:
         """Replace the places where feet land next.
 
         A foot in the air on a minimum-jerk path takes its new foothold from the
         next lift-off on; on the paper's law it turns to it at once. Each is
-        used once.
+        used once. One that will lie out of reach when the foot gets there, at
+        the present twist, is drawn in.
 
         Args:
             footholds: (4, 3) m in the b' of now.
             given: (4,) True where the row holds a foothold.
+
+        Returns:
+            (4,) True where a foothold was taken as it was given.
         """
-        places = np.asarray(footholds, dtype=float)
-        for foot, place, valid in zip(self.state.feet, places.tolist(), given, strict=True):
-            if valid and all(map(math.isfinite, place)):
-                goal = self.state.pose.to_world(complex(place[0], place[1]))
-                if foot.swinging and foot.shape.law == "minimum_jerk":
-                    foot.later = (goal, place[2])
-                else:
-                    foot.goal, foot.goal_z = goal, place[2]
+        state = self.state
+        taken = np.zeros(4, dtype=np.bool_)
+        places = np.asarray(footholds, dtype=float).tolist()
+        for leg, (foot, place, phase) in enumerate(zip(state.feet, places, leg_phases(state), strict=True)):
+            if not given[leg] or not all(map(math.isfinite, place)):
+                continue
+            waits = foot.swinging and foot.shape.law == "minimum_jerk"
+            # Turns until the foot lands there: at the end of this swing, or of the next one.
+            turns = state.rhythm.share - phase + (0.0 if foot.swinging and not waits else 1.0)
+            landing = state.pose.moved(state.velocity, state.yaw_rate, turns * state.cycle)
+            wanted = state.pose.to_world(complex(place[0], place[1]))
+            goal, taken[leg] = self._within_reach(foot, landing, wanted)
+            if waits:
+                foot.later = (goal, place[2])
+            else:
+                foot.goal, foot.goal_z = goal, place[2]
+        return taken
+
+    def _within_reach(self, foot: Foot, landing: VirtualPose, wanted: complex) -> tuple[complex, bool]:
+        """A foothold in the world, drawn in to the foot's reach at `landing`, and whether it was in it."""
+        reach = self.config.foothold.reach
+        away = landing.to_local(wanted) - foot.nominal
+        if abs(away) <= reach:
+            return wanted, True
+        return landing.to_world(foot.nominal + away * (reach / abs(away))), False
 
     def _accept(self, state: GaitState, inputs: GaitInputs) -> None:
         state.target = place_of(inputs.gait)

@@ -209,3 +209,56 @@ def test_swinging_feet_are_displaced_towards_the_fall() -> None:
         landed[rate] = run.in_world[down, 0]
     # Nose down is forward, left side down is left.
     assert landed[1.0] - landed[0.0] == pytest.approx(0.02 + 0.02j, abs=2e-3)
+
+
+def landings(run, leg: int) -> np.ndarray:
+    """How far from its nominal place in b' a leg lands, m."""
+    down = np.flatnonzero(run.swing[:-1, leg] & ~run.swing[1:, leg]) + 1
+    return run.foot_position[down, leg, :2] - STANCE[leg, :2]
+
+
+@pytest.mark.parametrize("law", ["virtual_force", "minimum_jerk"])
+def test_landing_places_shift_on_demand_and_come_back(law: str) -> None:
+    foothold = replace(FOOTHOLD, law=law, shift_limit=0.05, shift_rate=0.5)
+    shift = np.array([0.012, -0.03])
+    walker, other = make(foothold=foothold), make(foothold=foothold)
+    run = drive(walker, command(0.08, foothold_shift=shift), 3.0, 0.005)
+    plain = drive(other, command(0.08), 3.0, 0.005)
+    for leg in range(4):
+        ahead = landings(run, leg)
+        expected = landings(plain, leg)[-1] + shift
+        np.testing.assert_allclose(ahead[-1], expected, atol=1.5e-3)
+        moved = np.abs(np.diff(run.in_world[:, leg]))
+        assert moved.max() < 0.005 * 1.6  # no jump, though the demand was one
+    back = drive(walker, command(0.08), 2.0, 0.005)
+    np.testing.assert_allclose(landings(back, 0)[-1], landings(plain, 0)[-1], atol=1.5e-3)
+    # Feet that stand are never moved.
+    world, still = run.in_world, ~run.swing[1:] & ~run.swing[:-1]
+    assert np.abs(np.diff(world, axis=0))[still].max() < 1e-12
+
+
+def test_a_shift_is_bounded_and_without_one_nothing_changes() -> None:
+    foothold = replace(FOOTHOLD, law="minimum_jerk", shift_limit=0.02, shift_rate=10.0)
+    walker = make(foothold=foothold)
+    drive(walker, command(0.05, foothold_shift=np.array([3.0, 4.0])), 1.0)
+    assert walker.state.landing_shift == pytest.approx(0.012 + 0.016j)
+    drive(walker, command(0.05, foothold_shift=np.array([np.nan, 0.0])), 0.1)
+    assert walker.state.landing_shift == 0.0
+    one, two = make(foothold=foothold), make(foothold=foothold)
+    nothing = drive(one, command(0.05, 0.2, foothold_shift=np.zeros(2)), 2.0)
+    np.testing.assert_array_equal(nothing.foot_position, drive(two, command(0.05, 0.2), 2.0).foot_position)
+
+
+@pytest.mark.parametrize("law", ["virtual_force", "minimum_jerk"])
+def test_footholds_out_of_reach_are_drawn_in_and_named(law: str) -> None:
+    walker = make(foothold=replace(FOOTHOLD, law=law, reach=0.05))
+    drive(walker, command(0.03, 0.1), 3.0)
+    goal = STANCE + np.array([[0.3, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.3, 0.0], [0.05, 0.0, 0.0]])
+    taken = walker.set_footholds(goal, [True, True, True, False])
+    assert taken.tolist() == [False, True, False, False]
+    waits = [law == "minimum_jerk" and foot.swinging for foot in walker.state.feet]
+    run = drive(walker, command(0.03, 0.1), 1.6, 0.005)
+    for leg in (0, 1, 2):
+        away = np.hypot(*landings(run, leg)[1 if waits[leg] else 0])
+        assert away < 0.053
+        assert (away > 0.045) == (leg != 1)
