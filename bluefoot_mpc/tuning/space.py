@@ -97,59 +97,68 @@ def _control(name: str, low: float, high: float, key: str) -> Parameter:
 
 
 _POSTURE = (
-    _control("trunk_height", 0.095, 0.14, "posture.trunk_height"),
+    _control("trunk_height", 0.085, 0.14, "posture.trunk_height"),
     _control("stance_x", 0.11, 0.18, "posture.stance_x"),
     _control("stance_y", 0.13, 0.20, "posture.stance_y"),
     _control("trunk_forward", -0.012, 0.012, "posture.trunk_forward"),
+)
+_FEED_FORWARD = (
+    _control("level_gain", 0.1, 0.8, "posture.level_gain"),
+    _control("mixing", 0.0, 0.8, "servo.mixing"),
+    _control("back_emf", 0.0, 1.0, "servo.back_emf"),
 )
 _SWING = {
     "minimum_jerk": (
         _control("ground_matching", -1.0, 1.0, "gait.foothold.ground_matching"),
         _control("apex", 0.35, 0.75, "gait.foothold.apex"),
     ),
-    "virtual_force": (_control("swing_rate", 5.0, 14.0, "gait.foothold.swing_rate"),),
+    "virtual_force": (_control("swing_rate", 4.0, 14.0, "gait.foothold.swing_rate"),),
 }
 _VERTICAL = {"minimum_jerk": "quintic", "virtual_force": "sine"}
 
 
-def trot_space(law: str = "minimum_jerk") -> Space:
+def trot_space(law: str = "virtual_force", *, feed_forward: bool = True) -> Space:
     """Timing, lift, stance and swing shape of a trot at one speed.
+
+    Parameters that the gait's table knows have the name of its column.
 
     Args:
         law: how feet swing, ``minimum_jerk`` (lifted by quintics) or ``virtual_force`` (by the oscillator).
+        feed_forward: whether levelling and the servos' feed-forward vary too; the paper's laws have none.
 
     Raises:
         UnknownNameError: there is no such law.
     """
     timing = (
-        _gait("trot", "cycle", 0.2, 0.55, "cycle_min", "cycle_max"),
-        _gait("trot", "swing_share", 0.25, 0.5, "swing_share"),
-        _gait("trot", "lift", 0.010, 0.035, "height_min"),
+        _gait("trot", "cycle_time", 0.2, 0.55, "cycle_min", "cycle_max"),
+        _gait("trot", "swing_share", 0.2, 0.5, "swing_share"),
+        _gait("trot", "step_height", 0.010, 0.035, "height_min"),
     )
-    return _space("trot", law, timing)
+    return _space("trot", law, timing, feed_forward)
 
 
-def walk_space(law: str = "minimum_jerk") -> Space:
+def walk_space(law: str = "virtual_force", *, feed_forward: bool = True) -> Space:
     """Timing, lift, stance and sway of a walk at one speed.
 
     Args:
         law: as for `trot_space`.
+        feed_forward: as for `trot_space`.
 
     Raises:
         UnknownNameError: there is no such law.
     """
     timing = (
-        _gait("walk", "cycle", 0.7, 2.0, "cycle_min", "cycle_max"),
+        _gait("walk", "cycle_time", 0.7, 2.0, "cycle_min", "cycle_max"),
         _gait("walk", "swing_share", 0.12, 0.25, "swing_share"),
-        _gait("walk", "lift", 0.012, 0.03, "height_min"),
+        _gait("walk", "step_height", 0.012, 0.03, "height_min"),
         _control("zmp_lead", 0.05, 0.4, "zmp.lead"),
         _control("zmp_gain", 1.0, 8.0, "zmp.gain"),
         _control("zmp_offset", 0.01, 0.04, "zmp.max_offset"),
     )
-    return _space("walk", law, timing)
+    return _space("walk", law, timing, feed_forward)
 
 
-def _space(gait: str, law: str, timing: tuple[Parameter, ...]) -> Space:
+def _space(gait: str, law: str, timing: tuple[Parameter, ...], feed_forward: bool) -> Space:
     if law not in _SWING:
         raise UnknownNameError("swing law", law, _SWING)
     fixed = (
@@ -157,7 +166,8 @@ def _space(gait: str, law: str, timing: tuple[Parameter, ...]) -> Space:
         f"control.gait.foothold.vertical={_VERTICAL[law]}",
         f"control.gait.{gait}.height_v=0.0",
     )
-    return Space(parameters=(*timing, *_POSTURE, *_SWING[law]), fixed=fixed)
+    more = _FEED_FORWARD if feed_forward else ()
+    return Space(parameters=(*timing, *_POSTURE, *_SWING[law], *more), fixed=fixed)
 
 
 SPACES = {"trot": trot_space, "walk": walk_space}

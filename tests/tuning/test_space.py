@@ -57,5 +57,5 @@ def test_shipped_spaces_name_settings_that_exist_and_stay_inside_their_limits(ga
     resolved = resolve(find_scenario("walk"), RunOptions(overrides=space.overrides(values)))
     control = resolved.stages.control
     assert control.gait.foothold.law == law
-    assert control.gait.timing(gait).cycle_min == control.gait.timing(gait).cycle_max == values["cycle"]
+    assert control.gait.timing(gait).cycle_min == control.gait.timing(gait).cycle_max == values["cycle_time"]
     assert control.posture.stance_x == values["stance_x"]
