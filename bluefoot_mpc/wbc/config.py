@@ -11,15 +11,19 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class WholeBodyWeights:
-    """Cost of a squared error of each task; the ratios matter, not the scale."""
+    """Cost of a squared error of each task, against that of a standing foot's slip.
 
-    com: Triple = (20.0, 20.0, 20.0)  # per (m/s²)², world x, y, z
-    trunk: Triple = (10.0, 10.0, 10.0)  # per (rad/s²)², world x, y, z
+    The spread between the largest and the smallest is the problem's condition:
+    beyond 1e7 or so first-order and interior solvers lose digits of the torque.
+    """
+
+    contact: float = 1.0  # per (m/s²)², slip of a standing foot
+    com: Triple = (0.1, 0.1, 0.1)  # per (m/s²)², world x, y, z
+    trunk: Triple = (0.05, 0.05, 0.05)  # per (rad/s²)², world x, y, z
     momentum: Triple = (0.0, 0.0, 0.0)  # per (rad/s²)², rate of angular momentum over nominal inertia
-    contact: float = 2000.0  # per (m/s²)², slip of a standing foot
-    swing: float = 20.0  # per (m/s²)², swing foot
-    posture: float = 0.01  # per (rad/s²)², every joint
-    force: float = 0.01  # per (share of the weight a foot carries)², away from an even share
+    swing: float = 0.1  # per (m/s²)², swing foot
+    posture: float = 1e-4  # per (rad/s²)², every joint
+    force: float = 0.05  # per (share of the weight that a foot carries)², away from an even share
 
     def __post_init__(self) -> None:
         for name in ("com", "trunk", "momentum"):
