@@ -119,8 +119,11 @@ class GaitEngine:
         if state.place != state.target and not state.landing:
             most = dt / max(self.config.blend_time, CYCLES_TO_CHANGE * state.cycle)
             state.place += min(most, max(-most, state.target - state.place))
-        before = state.now
-        state.now = now = self.parameters.at(state.place, state.velocity, state.yaw_rate)
+        read = (state.place, state.velocity, state.yaw_rate)
+        if read == state.read:
+            return
+        before, state.read = state.now, read
+        state.now = now = self.parameters.at(*read)
         if not state.landing:
             state.rhythm = self.transition.rhythm(state.place, now.shares)
         state.cycle = now.cycle_time

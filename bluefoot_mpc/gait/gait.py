@@ -71,12 +71,11 @@ class Gait:
         state = self.state
         self._accept(state, inputs)
         contact: list[bool] = np.asarray(inputs.contact, dtype=bool).tolist()
-        estimates = _estimates(inputs.foot_position)
-        state.reflex = self._reflex(state, inputs, contact, estimates)
+        state.reflex = self._reflex(state, inputs, contact)
         stride = self._engine.advance(state, dt)
         self._elapsed += dt
-        if state.walking and stride is not None:
-            self._check_contacts(state, contact, estimates, stride)
+        if state.walking and stride is not None and self.config.foothold.early_contact:
+            self._check_contacts(state, contact, _estimates(inputs.foot_position), stride)
         return self._output(state)
 
     def schedule(self, horizon: float, dt: float, *, exact: bool = False) -> ContactSchedule:
@@ -180,13 +179,13 @@ class Gait:
         state: GaitState,
         inputs: GaitInputs,
         contact: list[bool],
-        estimates: list[tuple[complex, float]] | None,
     ) -> ReflexOutput:
         if not self.config.reflex.enabled:
             return IDLE
         error: list[float] = np.asarray(inputs.tilt_rate_error, dtype=float).tolist()
         if not all(map(math.isfinite, error)) or is_quiet(error, self.config.reflex):
             return IDLE
+        estimates = _estimates(inputs.foot_position)
         if estimates is None:
             places = [foot.in_b(state.pose) for foot in state.feet]
         else:

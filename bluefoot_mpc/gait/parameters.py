@@ -104,13 +104,13 @@ class LawReader:
         """Parameters at `place` in [0, 1] and a commanded twist."""
         speed, rate = abs(velocity), abs(yaw_rate)
         trot, walk = self._timings
-        height = (1.0 - place) * step_height(speed, rate, trot) + place * step_height(speed, rate, walk)
-        if place <= 0.0:
-            cycle = cycle_time(speed, rate, trot)
+        if place <= 0.0 or place >= 1.0:
+            timing = trot if place <= 0.0 else walk
+            cycle, height = cycle_time(speed, rate, timing), step_height(speed, rate, timing)
         else:
+            height = (1.0 - place) * step_height(speed, rate, trot) + place * step_height(speed, rate, walk)
             cycle = cycle_time(speed, rate, walk)
-            if place < 1.0:
-                cycle += (1.0 - place) * (cycle_time(speed, rate, trot) - cycle)
+            cycle += (1.0 - place) * (cycle_time(speed, rate, trot) - cycle)
         return Parameters(cycle, self._shares, height, *self._rest)
 
 

@@ -97,6 +97,7 @@ class GaitState:
         cycle: cycle time, s.
         rhythm: limit cycle in force.
         now: parameters at the present speed.
+        read: place, velocity and yaw rate for which they were read.
         style: trunk parameters, following those of `now`.
         wanted_shift: wanted shift of landing places, m in b'.
         landing_shift: the shift in force.
@@ -119,6 +120,7 @@ class GaitState:
     idle: float = 0.0
     reflex: ReflexOutput = IDLE
     cycle: float = 1.0
+    read: tuple[float, complex, float] | None = None
     wanted_shift: complex = 0j
     landing_shift: complex = 0j
 
