@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from bluefoot_mpc.control.leg_masses import LegMasses
 from bluefoot_mpc.gait.gait import GaitOutput
+from bluefoot_mpc.model.parameters import GRAVITY
 from bluefoot_mpc.types import ContactSchedule, FloatArray
 from bluefoot_mpc.zmp.preview import ComPlan, PreviewConfig, PreviewController, PreviewInputs
 
@@ -76,8 +77,9 @@ class PreviewSway:
             height=float(trunk[2] + com[2]), pose=gait.virtual_pose,
         )  # fmt: skip
         self.plan = plan = self._preview.step(inputs, dt)
-        self.offset = plan.start[0] - com[:2] - neutral
-        return np.asarray(plan.zmp[0])
+        place, _, acceleration = plan.start
+        self.offset = place - com[:2] - neutral
+        return np.asarray(place - float(trunk[2] + com[2]) / GRAVITY * acceleration)
 
     def _path(self, gait: GaitOutput, place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(n, 2) m and (n, 2) m/s, a point of b' carried along by the commanded twist; (n,) rad of turn."""
