@@ -20,6 +20,7 @@ from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.settings import require_positive, require_range
 from bluefoot_mpc.tuning.cases import TuningCase, measure
 from bluefoot_mpc.tuning.objective import Figures, cost
+from bluefoot_mpc.tuning.path import Candidate
 from bluefoot_mpc.tuning.space import Space, Values
 
 Measure = Callable[[TuningCase, str, tuple[str, ...], int], Figures]
@@ -122,6 +123,15 @@ def best(study: optuna.Study, space: Space) -> StudyResult:
         trials=_spent(study),
         figures=json.loads(trial.user_attrs["figures"]),
     )
+
+
+def candidates(config: StudyConfig, space: Space, count: int) -> list[Candidate]:
+    """The best points of a study that met every rung, best first, `count` at most."""
+    complete = _open(config).get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,))
+    found = [
+        Candidate(space.checked(trial.params), trial.value) for trial in complete if trial.value is not None
+    ]
+    return sorted(found, key=lambda candidate: candidate.cost)[:count]
 
 
 def _open(config: StudyConfig) -> optuna.Study:
