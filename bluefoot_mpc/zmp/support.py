@@ -28,7 +28,7 @@ _CHUNK = 256
 class SupportConfig:
     """How far the edge of the support is stayed away from."""
 
-    margin: float = 0.012  # m, between the edge and the region; a narrower support shrinks to its centre
+    margin: float = 0.01  # m, between the edge and the region; a narrower support shrinks to its centre
     half_width: float = 0.003  # m, of the strip around feet that stand on one line
 
     def __post_init__(self) -> None:

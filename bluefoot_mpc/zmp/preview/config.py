@@ -20,7 +20,7 @@ class PreviewWeights:
     """
 
     zmp: float = 1.0  # distance of the ZMP from its reference, 1/m²
-    position: float = 0.3  # of the centre of mass from its reference, 1/m²
+    position: float = 0.03  # of the centre of mass from its reference, 1/m²
     velocity: float = 1e-3  # of the centre of mass from its reference, s²/m²
     jerk: float = 2e-7  # s⁶/m²
     support_slack: float = 3e3  # ZMP out of its region, 1/m²
@@ -50,7 +50,7 @@ class PreviewConfig:
     height: float = 0.1  # m, nominal distance of the centre of mass above the ground
     support: SupportConfig = field(default_factory=SupportConfig)
     weights: PreviewWeights = field(default_factory=PreviewWeights)
-    depth: float = 0.006  # m inside its region, where the ZMP is wanted
+    depth: float = 0.008  # m inside its region, where the ZMP is wanted
     centre_pull: float = 0.0  # share of the way from there to the middle of the feet, 0 to 1
     reach: tuple[float, float] = (0.03, 0.03)  # m, forward and sideways from the nominal place
     rows: tuple[int, ...] = (16, 48)  # constraints that a small problem holds, the larger ones on demand

@@ -150,5 +150,5 @@ class PreviewController:
 
 def _solvers(config: PreviewConfig) -> tuple[Solver, ...]:
     # The rows of a problem are others every time: there is nothing to start from.
-    options = SolverOptions(warm_start=False)
+    options = SolverOptions(warm_start=False, max_iterations=2000)
     return tuple(make_solver(config.solver, size, options) for size in sizes(config))

@@ -16,6 +16,8 @@ class ComPlan:
     """Motion of the centre of mass over the horizon, horizontal, in the b' of now.
 
     b' of now is kept as an inertial frame: velocities are those over the ground.
+    A plan that is what is left of an earlier one has fewer samples, and the
+    first may be nearer.
 
     Attributes:
         time: (n,) s from now, of the samples.
@@ -84,26 +86,29 @@ def carried(points: FloatArray, pose: FloatArray, now: FloatArray) -> FloatArray
 
 
 def shifted(plan: ComPlan, age: float, pose: FloatArray, now: FloatArray) -> ComPlan:
-    """The plan as it looks `age` s after it was made, from the frame of now; at rest past its end.
+    """What is left of a plan `age` s after it was made, from the frame of now.
 
     Args:
         plan: in the frame at `pose`.
-        age: s.
+        age: s, less than the plan lasts.
         pose: (3,) x (m), y (m), yaw (rad) of that frame.
         now: (3,) of the wanted frame.
     """
     turn, offset = _change(pose, now)
-    states = np.array([plan.at(age + time) for time in (0.0, *plan.time.tolist())]) @ turn.T
-    states[:, 0] += offset
-    sample = np.minimum(np.searchsorted(plan.time, age + plan.time - 1e-9), len(plan.time) - 1)
-    past = (age + plan.time > plan.time[-1] + 1e-9)[:, None]
+    left = slice(int(np.searchsorted(plan.time, age, side="right")), None)
     return ComPlan(
-        time=plan.time, start=states[0], position=states[1:, 0], velocity=states[1:, 1],
-        acceleration=states[1:, 2], jerk=np.where(past, 0.0, plan.jerk[sample] @ turn.T),
-        zmp=np.where(past, states[1:, 0], plan.zmp[sample] @ turn.T + offset),
-        margin=plan.margin[sample], supported=plan.supported[sample], slack=plan.slack,
+        time=plan.time[left] - age,
+        start=carried(plan.at(age), pose, now),
+        position=plan.position[left] @ turn.T + offset,
+        velocity=plan.velocity[left] @ turn.T,
+        acceleration=plan.acceleration[left] @ turn.T,
+        jerk=plan.jerk[left] @ turn.T,
+        zmp=plan.zmp[left] @ turn.T + offset,
+        margin=plan.margin[left],
+        supported=plan.supported[left],
+        slack=plan.slack,
         status=Fallback.SHIFTED,
-    )  # fmt: skip
+    )
 
 
 def _change(pose: FloatArray, now: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -125,7 +125,9 @@ class PreviewProgram:
         self._take_levers(problem.levers)
         optimum, free = problem.path.copy(), problem.residuals
         chosen = np.argsort(free)[: 2 * self._config.rows[-1]]
-        free, gram = free[chosen], self._gram(problem, chosen)
+        gram = self._gram(problem, chosen)
+        scale = gram.diagonal() ** -0.5
+        gram, free = scale[:, None] * gram * scale, scale * free[chosen]
         step = 1.0 / float(np.abs(gram).sum(axis=1).max())
         multiplier, point = np.zeros(len(chosen)), np.zeros(len(chosen))
         momentum = 1.0
@@ -134,7 +136,7 @@ class PreviewProgram:
             faster = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * momentum * momentum))
             point = following + (momentum - 1.0) / faster * (following - multiplier)
             multiplier, momentum = following, faster
-        self._move(problem, optimum, chosen, multiplier)
+        self._move(problem, optimum, chosen, scale * multiplier)
         near_enough = bool(problem.residuals.min() > -self._config.nearest_violation)
         return ProgramResult(solved=near_enough, iterations=_GRADIENT_STEPS)
 
@@ -152,7 +154,7 @@ class PreviewProgram:
     def _gram(self, problem: PreviewProblem, chosen: Indices) -> FloatArray:
         """(k, k) products of the responses of rows, with their softness."""
         point, normals = chosen >> 2, problem.normals[chosen]
-        gram = np.matmul(normals, normals.T)
+        gram: FloatArray = np.matmul(normals, normals.T)
         gram *= self._products[point][:, point]
         gram.reshape(-1)[:: len(chosen) + 1] += self._softness[chosen]
         return gram
@@ -194,6 +196,6 @@ class _Stage:
         if not solution.ok:
             return solution.iterations, None
         given = solution.row_multiplier
-        multiplier = np.linalg.solve(problem.matrix.T, -solution.x) if given is None else given
+        multiplier = np.asarray(np.linalg.solve(problem.matrix.T, -solution.x) if given is None else given)
         usable = math.isfinite(float(multiplier.sum()))
         return solution.iterations, multiplier * _UNIT if usable else None
