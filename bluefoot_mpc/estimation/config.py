@@ -41,15 +41,19 @@ class ContactConfig:
     probation: int = 1  # frames a foot must stand still before it counts
     joint_noise: float = 0.0015  # rad, deviation of the rounding to one step
     foot_noise: float = 0.0003  # m, of a foot point beyond the joints' share
-    slip: float = 0.0015  # m per root second, wander of a standing foot
-    gate: float = 9.0  # squared deviations (3 axes) beyond which a foot slips or lifts
+    slip: float = 0.0007  # m per root second, wander of a standing foot
+    loose: float = 0.02  # m per root second, the same of a foot about to lift
+    lifting: float = 0.12  # s after another foot's touch for which the longest standing are about to lift
+    gate: float = 6.0  # squared deviations (3 axes) beyond which a foot slips or lifts
     blind_after: float = 0.2  # s without a standing foot until rest is assumed
     blind_speed: float = 0.5  # m/s, deviation of that assumption
 
     def __post_init__(self) -> None:
-        require_nonnegative(debounce=self.debounce, probation=self.probation, slip=self.slip)
+        require_nonnegative(
+            debounce=self.debounce, probation=self.probation, slip=self.slip, lifting=self.lifting
+        )
         require_positive(
-            joint_noise=self.joint_noise, foot_noise=self.foot_noise, gate=self.gate,
+            joint_noise=self.joint_noise, foot_noise=self.foot_noise, gate=self.gate, loose=self.loose,
             blind_after=self.blind_after, blind_speed=self.blind_speed,
         )  # fmt: skip
 

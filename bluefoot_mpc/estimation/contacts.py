@@ -7,6 +7,9 @@ from typing import NamedTuple
 
 from bluefoot_mpc.types import N_LEGS, BoolArray
 
+ABREAST = 0.06
+"""s, feet that touched within this time lift together."""
+
 
 class SwitchState(NamedTuple):
     """Memory of the debouncer.
@@ -52,3 +55,20 @@ def advance_switches(
         times.append(0.0 if edge else time)
         closed.append(now and (edge or value))
     return SwitchState(tuple(values), tuple(times), tuple(closed))
+
+
+def lifting_feet(state: SwitchState, lifting: float) -> list[bool]:
+    """(4,) True for feet about to lift: while others take over, those that have stood longest.
+
+    They bear next to nothing and drag over the ground before their switch opens:
+    with servos as soft as these by a tenth of the walking speed.
+
+    Args:
+        state: switches.
+        lifting: s after a foot's touch for which others are about to lift.
+    """
+    ages = [age if closed else -1.0 for closed, age in zip(state.contact, state.since_edge, strict=True)]
+    oldest = max(ages)
+    if oldest < lifting or not any(0.0 <= age < lifting for age in ages):
+        return [False] * N_LEGS
+    return [age > oldest - ABREAST for age in ages]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bluefoot_mpc.estimation.config import EstimatorConfig
-from bluefoot_mpc.estimation.contacts import SwitchState, advance_switches, initial_switches
+from bluefoot_mpc.estimation.contacts import SwitchState, advance_switches, initial_switches, lifting_feet
 from bluefoot_mpc.estimation.corrections import Settler
 from bluefoot_mpc.estimation.filter import FilterState, initial_state
 from bluefoot_mpc.estimation.ground import GroundEstimate, GroundPlane
@@ -140,27 +140,33 @@ class Estimator:
         before = memory.filter.estimate
         motion = self._strapdown.advance(before[:7], before[19:25], samples, (memory.time, frame.time))
         angles = (memory.rest.joints, memory.joints.newest, joints.newest)
-        ahead = self._predictor.advance(memory.filter, motion, angles, dt)
+        loose = lifting_feet(switches, self._config.contact.lifting)
+        ahead = self._predictor.advance(memory.filter, motion, angles, loose, dt)
         standing = [closed and answers > 0.0 for closed, answers in zip(switches.closed, known, strict=True)]
         state, stance = self._stance.advance(ahead, memory.stance, standing, dt)
+        firm = tuple([leg for leg in stance.used if not loose[leg]])
         rest = advance_rest(memory.rest, ahead.moved, joints.newest, dt, self._config.rest)
-        if at_rest(rest, standing, samples, state, self._config.rest):
-            state = correct_bias(state, samples, self._config.rest, self._settler)
+        state = self._correct_at_rest(state, rest, standing, samples)
         state, heading = self._correct_heading(state, memory.heading, frame, dt)
-        level = memory.level
-        if self._config.level.enabled:
-            state, level = self._level.advance(state, level, stance.used, self._ground.latest, dt)
+        state, level = self._correct_level(state, memory.level, firm, dt)
         report = self._odometry.advance(
             memory.position, before, state.estimate, ahead,
-            used=stance.used, contact=switches.contact, rate=memory.rate, sums=motion.sums,
+            used=firm, contact=switches.contact, rate=memory.rate, sums=motion.sums,
         )  # fmt: skip
         sample, age = (samples[-1], 0.0) if samples else (memory.sample, memory.imu_age + dt)
         self._memory = _Memory(
             frame.time, joints, switches, state, stance, heading, level, rest, sample, report, age
         )
         estimate = self._state(self._memory, known)
-        self._ground.step(estimate, _STANDING[stance.used], dt)
+        self._ground.step(estimate, _STANDING[firm], dt)
         return estimate
+
+    def _correct_at_rest(
+        self, state: FilterState, rest: RestState, standing: list[bool], samples: list[Sample]
+    ) -> FilterState:
+        if not at_rest(rest, standing, samples, state, self._config.rest):
+            return state
+        return correct_bias(state, samples, self._config.rest, self._settler)
 
     def _correct_heading(
         self, state: FilterState, reference: HeadingReference, frame: SensorFrame, dt: float
@@ -169,6 +175,13 @@ class Estimator:
         if not config.enabled:
             return state, reference
         return advance_heading(state, reference, frame.imu, dt=dt, config=config, settler=self._settler)
+
+    def _correct_level(
+        self, state: FilterState, level: LevelState, firm: tuple[int, ...], dt: float
+    ) -> tuple[FilterState, LevelState]:
+        if not self._config.level.enabled:
+            return state, level
+        return self._level.advance(state, level, firm, self._ground.latest, dt)
 
     def _start(self, frame: SensorFrame, memory: _Memory | None) -> BodyState:
         """First frame, or the first after a jump of the clock (then with what was known)."""
@@ -182,7 +195,7 @@ class Estimator:
             state = _doubtful(memory.filter, state)
         carried = np.zeros(MOTION_SIZE)
         carried[:7] = state.estimate[:7]
-        ahead = self._predictor.advance(state, Motion(carried), (joints.newest,) * 3, 0.0)
+        ahead = self._predictor.advance(state, Motion(carried), (joints.newest,) * 3, [True] * 4, 0.0)
         state = self._stance.plant(state, ahead)
         place = np.zeros(3) if memory is None else memory.position
         report = self._report_at_start(state, ahead, place, switches)

@@ -15,6 +15,8 @@ from bluefoot_mpc.estimation.workspace import Workspace, compile_function
 from bluefoot_mpc.model.legs import LegGeometry
 from bluefoot_mpc.types import N_JOINTS, N_LEGS, FloatArray
 
+_INPUTS = ("before", "carried", "dt", "rest", "start", "now", "loose")
+
 
 class Prediction(NamedTuple):
     """The filter at a frame's time, before it sees that frame's feet.
@@ -62,7 +64,7 @@ class Predictor:
         self._parts = (self._half[:SIZE], self._half[SIZE:])
 
     def advance(
-        self, state: FilterState, motion: Motion, angles: tuple[FloatArray, ...], dt: float
+        self, state: FilterState, motion: Motion, angles: tuple[FloatArray, ...], loose: list[bool], dt: float
     ) -> Prediction:
         """Carry estimate and covariance over one frame.
 
@@ -70,13 +72,15 @@ class Predictor:
             state: at the start.
             motion: of the IMU, from `inertial.Strapdown`.
             angles: (16,) rad each: at rest, at the start, at the end.
+            loose: (4,) feet that may drag over the ground.
             dt: s.
         """
-        estimate, moving, step, rest, start, now = self._work.inputs
+        estimate, moving, step, rest, start, now, slips = self._work.inputs
         estimate[:] = state.estimate
         moving[:] = motion.values
         step[0] = dt
         rest[:], start[:], now[:] = angles
+        slips[:] = loose
         self._work.call()
         # F P F' + L L' in one product: (F L) times P F' over L', with the rate's lever L.
         carried, lever = self._parts
@@ -90,6 +94,7 @@ class Predictor:
 def _prediction(geometry: LegGeometry, config: EstimatorConfig) -> Any:
     before, carried, dt = ca.SX.sym("before", VALUES), ca.SX.sym("carried", 23), ca.SX.sym("dt")
     rest, start, now = (ca.SX.sym(name, N_JOINTS) for name in ("rest", "start", "now"))
+    loose = ca.SX.sym("loose", N_LEGS)
     velocity, feet = before[4:7], before[7:19]
     quaternion, velocity_after, way, turn, sums = ca.vertsplit(carried, [0, 4, 7, 10, 13, 23])
     rotation = symbols.rotation_matrix(quaternion)
@@ -102,11 +107,11 @@ def _prediction(geometry: LegGeometry, config: EstimatorConfig) -> Any:
     seen = ca.vec(rotation @ ca.reshape(from_imu, 3, N_LEGS))
     return compile_function(
         "prediction",
-        {"before": before, "carried": carried, "dt": dt, "rest": rest, "start": start, "now": now},
+        dict(zip(_INPUTS, (before, carried, dt, rest, start, now, loose), strict=True)),
         {
             "after": ca.vertcat(quaternion, velocity_after, feet_after, before[19:]),
             "step": ca.horzcat(step, lever),
-            "diagonal": _growth(config, dt, force),
+            "diagonal": _growth(config, dt, force, loose),
             "scene": ca.vertcat(points, from_imu, roll, way, seen - feet_after),
             "noise": noise,
             "moved": ca.mmax(ca.fabs(now - rest)),
@@ -114,10 +119,10 @@ def _prediction(geometry: LegGeometry, config: EstimatorConfig) -> Any:
     )
 
 
-def _growth(config: EstimatorConfig, dt: Any, force: Any) -> Any:
+def _growth(config: EstimatorConfig, dt: Any, force: Any, loose: Any) -> Any:
     """26 variances that slip, drifts and the noise of the specific force add."""
     imu = config.imu
-    slip = ca.repmat(ca.SX(config.contact.slip**2), 3 * N_LEGS, 1)
+    slip = ca.vec(ca.repmat(ca.if_else(loose, config.contact.loose**2, config.contact.slip**2).T, 3, 1))
     drifts = ca.vertcat(*[imu.gyro_drift**2] * 3, *[imu.accel_drift**2] * 3)
     return ca.vertcat(ca.SX(3, 1), dt * dt * force, dt * slip, dt * drifts, ca.SX(2, 1))
 

@@ -260,10 +260,12 @@ def moved(state: FilterState, samples: list[Sample]) -> Motion:
     return integrate(state.quaternion, state.velocity, samples, span=(0.0, DT), biases=biases)
 
 
-def predicted(state: FilterState, samples: list[Sample], angles: np.ndarray) -> Prediction:
+def predicted(
+    state: FilterState, samples: list[Sample], angles: np.ndarray, *, loose=(False,) * 4
+) -> Prediction:
     before = angles - 0.01
     predictor = Predictor(geometry(), CONFIG)
-    return predictor.advance(state, moved(state, samples), (angles + 0.03, before, angles), DT)
+    return predictor.advance(state, moved(state, samples), (angles + 0.03, before, angles), list(loose), DT)
 
 
 def test_prediction_keeps_the_covariance_symmetric_and_grows_it():
@@ -293,6 +295,9 @@ def test_predicted_covariance_is_the_transition_and_the_noise():
     diagonal[GYRO_BIAS] = DT * CONFIG.imu.gyro_drift**2
     diagonal[ACCEL_BIAS] = DT * CONFIG.imu.accel_drift**2
     after = predicted(state, samples, np.zeros(16)).filter
+    np.testing.assert_allclose(after.covariance, expected + np.diag(diagonal), rtol=0.0, atol=1e-16)
+    diagonal[9:12] = DT * CONFIG.contact.loose**2
+    after = predicted(state, samples, np.zeros(16), loose=(False, True, False, False)).filter
     np.testing.assert_allclose(after.covariance, expected + np.diag(diagonal), rtol=0.0, atol=1e-16)
 
 
