@@ -124,6 +124,8 @@ class GaitEngine:
             return
         before, state.read = state.now, read
         state.now = now = self.parameters.at(*read)
+        if now is before and not state.landing:
+            return
         if not state.landing:
             state.rhythm = self.transition.rhythm(state.place, now.shares)
         state.cycle = now.cycle_time

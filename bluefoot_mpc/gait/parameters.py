@@ -68,6 +68,8 @@ class Basis:
     style: Style
 
 
+STEP = 2e-4
+"""m/s and rad/s; smaller changes of the command, those of its tracking, leave a table's parameters alone."""
 NO_STYLE = Style()
 """Trunk parameters of a gait to which nobody told any."""
 
@@ -185,10 +187,19 @@ class TablesReader:
         self._walk = TableReader(tables[1], timings[1], basis)
         self._nominal = basis.nominal
         self._placed = any(table.stance_x or table.stance_y for table in tables)
+        self._key: tuple[float, int, int, int] = (0.0, 0, 0, 0)
         self._signs = [(math.copysign(1.0, p.real), math.copysign(1.0, p.imag)) for p in basis.nominal]
+        self._last = self._read(0.0, 0j, 0.0)
 
     def at(self, place: float, velocity: complex, yaw_rate: float) -> Parameters:
-        """Parameters at `place` in [0, 1] and a commanded twist."""
+        """Parameters at `place` in [0, 1] and a commanded twist, in steps of `STEP`."""
+        key = (place, round(velocity.real / STEP), round(velocity.imag / STEP), round(yaw_rate / STEP))
+        if key != self._key:
+            self._key = key
+            self._last = self._read(place, complex(key[1] * STEP, key[2] * STEP), key[3] * STEP)
+        return self._last
+
+    def _read(self, place: float, velocity: complex, yaw_rate: float) -> Parameters:
         if place <= 0.0:
             first = row = self._trot.row(velocity, yaw_rate)
         elif place >= 1.0:
