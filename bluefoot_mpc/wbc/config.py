@@ -18,11 +18,11 @@ class WholeBodyWeights:
     """
 
     contact: float = 1.0  # per (m/s²)², slip of a standing foot
-    com: Triple = (0.1, 0.1, 0.1)  # per (m/s²)², world x, y, z
-    trunk: Triple = (0.05, 0.05, 0.05)  # per (rad/s²)², world x, y, z
+    com: Triple = (0.3, 0.3, 0.3)  # per (m/s²)², world x, y, z
+    trunk: Triple = (0.1, 0.1, 0.1)  # per (rad/s²)², world x, y, z
     momentum: Triple = (0.0, 0.0, 0.0)  # per (rad/s²)², rate of angular momentum over nominal inertia
-    swing: float = 0.1  # per (m/s²)², swing foot
-    posture: float = 1e-4  # per (rad/s²)², every joint
+    swing: float = 0.3  # per (m/s²)², swing foot
+    posture: float = 1e-5  # per (rad/s²)², every joint
     force: float = 0.05  # per (share of the weight that a foot carries)², away from an even share
 
     def __post_init__(self) -> None:

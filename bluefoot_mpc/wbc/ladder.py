@@ -13,39 +13,50 @@ from bluefoot_mpc.types import BoolArray, FloatArray
 from bluefoot_mpc.wbc.constraints.friction import onto_pyramid
 from bluefoot_mpc.wbc.model import WholeBodyModel
 
-_ROUNDS = 12
+_ROUNDS = 40
+_SHORTEST = 1e-6  # step of the line search
+_SETTLED = 1e-12  # fall of the cost that a step promises, relative
 _PENALTY = 1e4  # of a squared violation, over the mean of the cost's diagonal
 
 
 def nearest_point(problem: QpProblem) -> FloatArray | None:
     """(n,) the optimum with rows and bounds as steep penalties; None where even that has none.
 
-    Works on problems without a feasible point. Repeats a least squares with the
-    rows that the last one violated (a semismooth Newton method on the penalty).
+    Works on problems without a feasible point: newton's method on a convex function that
+    is quadratic in pieces, with a line search, so that it cannot cycle.
     """
     size = len(problem.gradient)
     matrix = np.vstack([problem.matrix, np.eye(size)])
     lower = np.concatenate([problem.lower, problem.floor])
     upper = np.concatenate([problem.upper, problem.ceiling])
-    if not (
-        np.isfinite(problem.hessian).all()
-        and np.isfinite(problem.gradient).all()
-        and np.isfinite(matrix).all()
+    hessian, gradient = problem.hessian, problem.gradient
+    if (
+        not all(np.isfinite(part).all() for part in (hessian, gradient, matrix))
+        or np.isnan([lower, upper]).any()
     ):
         return None
-    penalty = _PENALTY * float(np.trace(problem.hessian)) / size
-    active = np.zeros(len(matrix), dtype=bool)
-    x = np.zeros(size)
-    for _ in range(_ROUNDS):
-        rows = matrix[active]
-        side = np.where(matrix @ x > upper, upper, lower)[active]
-        cost = problem.hessian + penalty * rows.T @ rows
-        x[:] = np.linalg.solve(cost, penalty * rows.T @ side - problem.gradient)
+    penalty = _PENALTY * float(np.trace(hessian)) / size
+
+    def excess(x: FloatArray) -> FloatArray:
         value = matrix @ x
-        violated = (value > upper) | (value < lower)
-        if np.array_equal(violated, active):
+        return np.asarray(value - np.clip(value, lower, upper))
+
+    def cost(x: FloatArray) -> float:
+        over = excess(x)
+        return float(0.5 * x @ hessian @ x + gradient @ x + 0.5 * penalty * over @ over)
+
+    x = np.clip(np.zeros(size), problem.floor, problem.ceiling)
+    for _ in range(_ROUNDS):
+        over = excess(x)
+        rows = matrix[over != 0.0]
+        slope = hessian @ x + gradient + penalty * matrix.T @ over
+        step = -np.linalg.solve(hessian + penalty * rows.T @ rows, slope)
+        start, descent, length = cost(x), float(slope @ step), 1.0
+        while cost(x + length * step) > start + 1e-4 * length * descent and length > _SHORTEST:
+            length *= 0.5
+        x = x + length * step
+        if -descent <= _SETTLED * (1.0 + abs(start)):
             break
-        active = violated
     return x if np.isfinite(x).all() else None
 
 
