@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from bluefoot_mpc.control.body_planner import BodyPlannerConfig
 from bluefoot_mpc.control.ground import GroundAdaptationConfig
 from bluefoot_mpc.control.modes import ModeConfig
 from bluefoot_mpc.control.posture import PostureConfig
@@ -30,5 +31,6 @@ class ControlConfig:
     preview: PreviewConfig = field(default_factory=PreviewConfig)
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
     ground: GroundAdaptationConfig = field(default_factory=GroundAdaptationConfig)
+    whole_body: BodyPlannerConfig = field(default_factory=BodyPlannerConfig)
     servo: ServoMapConfig = field(default_factory=ServoMapConfig)
     modes: ModeConfig = field(default_factory=ModeConfig)

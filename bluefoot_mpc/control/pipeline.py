@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bluefoot_mpc.control import load_share, modes, posture, servo_map, tracking
+from bluefoot_mpc.control import modes, posture, servo_map, tracking
+from bluefoot_mpc.control.body_planner import BodyPlanner, Surroundings
 from bluefoot_mpc.control.command import usable
 from bluefoot_mpc.control.config import ControlConfig
 from bluefoot_mpc.control.ground import GroundAdapter
@@ -23,9 +24,8 @@ from bluefoot_mpc.control.targets import JointTargets
 from bluefoot_mpc.control.trunk import Footing, JointsInStance, TrunkPlanner
 from bluefoot_mpc.estimation.estimator import Estimator
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.gait.gait import Gait, GaitInputs, GaitOutput
+from bluefoot_mpc.gait.gait import Gait, GaitInputs, GaitOutput, Style
 from bluefoot_mpc.geometry import rotation_from_rpy
-from bluefoot_mpc.model.dynamics import Dynamics
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.types import (
     N_JOINTS,
@@ -39,6 +39,7 @@ from bluefoot_mpc.types import (
     SensorFrame,
     Telemetry,
 )
+from bluefoot_mpc.wbc import WholeBodyPlan
 
 BLIND = "the estimate is not to be trusted: the robot does not walk on"
 
@@ -71,8 +72,8 @@ class Pipeline:
         self._gait = Gait(config.gait, stance.feet, posture.style(stance, config.posture, config.servo))
         self._targets = JointTargets(geometry, config.ankle)
         self._trunk = TrunkPlanner(stance, config.posture, self._sway, self._targets.reach)
-        self._dynamics = Dynamics(robot)
-        self._body = PlannedBody(geometry)
+        self._body = PlannedBody(robot.parameters.servo)
+        self._planner = BodyPlanner(robot, config.whole_body)
         self._ground = GroundAdapter(config.ground)
         self._require_reachable()
         self.reset()
@@ -84,6 +85,7 @@ class Pipeline:
         self._trunk.reset()
         self._targets.reset()
         self._body.reset()
+        self._planner.reset()
         self._ground.reset()
         self._modes = modes.ModeState()
         self._tracking = tracking.TrackingState()
@@ -115,7 +117,8 @@ class Pipeline:
         footing = self._footing(estimate)
         reference, zmp, held = self._trunk.step(gait, motion, estimate, footing, dt)
         joints, cut = self._targets.step(reference, frame, dt, gait.style.ankle_shift)
-        goals = self._fed_forward(gait, reference, joints, frame)
+        plan = self._planned(gait, reference, joints, frame)
+        goals = self._goals(gait.style, joints, plan, frame)
         command = JointCommand(
             position=goals, speed=np.zeros(N_JOINTS), torque_limit=np.full(N_JOINTS, self._modes.torque)
         )
@@ -207,22 +210,37 @@ class Pipeline:
             self._ground.step(estimate.foot_position_in_base @ upright.T, standing, dt)
         return replace(gait, foot_position=self._ground.place(gait.foot_position))
 
-    def _fed_forward(
+    def _planned(
         self, gait: GaitOutput, reference: PostureReference, joints: FloatArray, frame: SensorFrame
+    ) -> WholeBodyPlan | None:
+        """The whole-body plan behind the references; None where none is wanted."""
+        self._body.step(gait, reference, joints, self.period)
+        if not self.config.whole_body.enabled or not self._targets.started:
+            return None
+        around = Surroundings(
+            feet=self._gait.feet_ahead(), slope=self._ground.slope, voltage=self._voltage(frame),
+            derating=float(servo_map.derating(frame.joint_temperature, self.config.servo).min()),
+            com=self._trunk.plan,
+        )  # fmt: skip
+        return self._planner.step(self._body, gait, around, self.period)
+
+    def _goals(
+        self, style: Style, joints: FloatArray, plan: WholeBodyPlan | None, frame: SensorFrame
     ) -> FloatArray:
-        config, robot, style = self.config.servo, self._robot, gait.style
-        self._body.step(reference, joints, self.period)
-        if style.mixing == style.back_emf == 0.0 or not self._targets.started:
+        """(16,) rad, goals that run ahead of `joints` by what torque and speed take."""
+        if plan is None or style.mixing == style.back_emf == 0.0:
             return joints
-        share = load_share.load_ramp(gait, 0.04)
-        torque, _ = load_share.static_torques(self._dynamics, self._body.q, share)
-        torque *= servo_map.derating(frame.joint_temperature, config)
-        servo = robot.parameters.servo
-        voltage = frame.voltage if frame.voltage_valid else servo.nominal_voltage
-        feed = servo_map.Feed(torque=style.mixing * torque, speed=style.back_emf * self._body.joint_speed)
-        goals = servo_map.goals(servo, joints, feed, voltage, config)
-        physical = robot.geometry
-        return np.minimum(np.maximum(goals, physical.physical_lower), physical.physical_upper)
+        servo, geometry = self._robot.parameters.servo, self._robot.geometry
+        feed = servo_map.Feed(
+            torque=style.mixing * plan.torque, speed=style.back_emf * self._body.joint_speed
+        )
+        goals = servo_map.goals(servo, joints, feed, self._voltage(frame), self.config.servo)
+        return np.minimum(np.maximum(goals, geometry.physical_lower), geometry.physical_upper)
+
+    def _voltage(self, frame: SensorFrame) -> float:
+        servo = self._robot.parameters.servo
+        known = frame.voltage_valid and frame.voltage > 0.5 * servo.nominal_voltage
+        return frame.voltage if known else servo.nominal_voltage
 
     def _gait_inputs(
         self, twist: tracking.Twist, motion: MotionCommand, estimate: BodyState, upright: FloatArray

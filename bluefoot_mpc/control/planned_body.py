@@ -4,44 +4,65 @@ from __future__ import annotations
 
 import numpy as np
 
-from bluefoot_mpc.geometry import quaternion_from_rpy
-from bluefoot_mpc.model.legs import LegGeometry
-from bluefoot_mpc.types import FloatArray, PostureReference
+from bluefoot_mpc.gait.gait import GaitOutput
+from bluefoot_mpc.geometry import quaternion_from_rpy, rotation_from_rpy
+from bluefoot_mpc.model.parameters import ServoParameters
+from bluefoot_mpc.types import N_JOINTS, FloatArray, PostureReference
+
+_NQ, _NV = 7 + N_JOINTS, 6 + N_JOINTS
 
 
 class PlannedBody:
     """Follows the references from tick to tick and differentiates them.
 
+    b' is taken as an inertial frame for the tick: positions are in it, and
+    velocities are those over the ground, in its axes.
+
     Attributes:
         q: (23,) trunk position in b' (m), quaternion xyzw, joints (rad).
-        joint_speed: (16,) rad/s, planned joint speeds.
+        v: (22,) trunk twist in its own axes (m/s, rad/s), joints (rad/s).
 
     Args:
-        geometry: the legs.
+        servo: the joints' servos; what they cannot follow is no planned speed.
     """
 
-    def __init__(self, geometry: LegGeometry) -> None:
-        self._fastest = 12.0
+    def __init__(self, servo: ServoParameters) -> None:
+        self._fastest = servo.no_load_speed
         self.reset()
 
     def reset(self) -> None:
         """Forget the last reference."""
-        self.q = np.zeros(23)
-        self.joint_speed = np.zeros(16)
-        self._joints: FloatArray | None = None
+        self.q = np.zeros(_NQ)
+        self.q[6] = 1.0
+        self.v = np.zeros(_NV)
+        self._last: tuple[FloatArray, FloatArray, FloatArray] | None = None
 
-    def step(self, reference: PostureReference, joints: FloatArray, dt: float) -> None:
+    @property
+    def joint_speed(self) -> FloatArray:
+        """(16,) rad/s, planned joint speeds."""
+        return self.v[6:]
+
+    def step(self, gait: GaitOutput, reference: PostureReference, joints: FloatArray, dt: float) -> None:
         """Take the references of a tick.
 
         Args:
+            gait: the motion of b'.
             reference: wanted trunk and feet.
             joints: (16,) rad, joint angles that reach them.
             dt: s.
         """
-        self.q[:3] = reference.trunk_position
-        self.q[3:7] = quaternion_from_rpy(reference.trunk_rpy)
-        self.q[7:] = joints
-        if self._joints is not None:
-            speed = (joints - self._joints) / dt
-            self.joint_speed = np.minimum(np.maximum(speed, -self._fastest), self._fastest)
-        self._joints = joints
+        place, rpy = reference.trunk_position, reference.trunk_rpy
+        self.q[:3], self.q[3:7], self.q[7:] = place, quaternion_from_rpy(rpy), joints
+        if self._last is not None:
+            last_place, last_rpy, last_joints = self._last
+            x, y, _ = place.tolist()
+            over_ground = (place - last_place) / dt
+            over_ground[:2] += gait.velocity + gait.yaw_rate * np.array([-y, x])
+            # Trunk angles are small: their rates are taken for the angular velocity.
+            turning = (rpy - last_rpy) / dt
+            turning[2] += gait.yaw_rate
+            rotation = rotation_from_rpy(rpy)
+            self.v[:3], self.v[3:6] = over_ground @ rotation, turning @ rotation
+            speed = (joints - last_joints) / dt
+            self.v[6:] = np.minimum(np.maximum(speed, -self._fastest), self._fastest)
+        self._last = (place, rpy, joints)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bluefoot_mpc.control.body_planner import BodyPlannerConfig
 from bluefoot_mpc.control.config import ControlConfig
 from bluefoot_mpc.control.ground import GroundAdaptationConfig
 from bluefoot_mpc.control.servo_map import ServoMapConfig
@@ -24,6 +25,7 @@ def preset(name: str) -> ControlConfig:
     if name == "mpc":
         return ControlConfig(
             ground=GroundAdaptationConfig(enabled=True),
+            whole_body=BodyPlannerConfig(enabled=True),
             servo=ServoMapConfig(mixing=0.6, back_emf=1.0),
         )
     raise UnknownNameError("controller", name, CONTROLLERS)
