@@ -13,6 +13,7 @@ from bluefoot_mpc.exceptions import ConfigurationError
 
 MAX_STATES = 1_000_000
 """A million states take minutes; nobody learns from more."""
+MAX_BENCH_SEEDS = 1000
 _Unset = tyro.conf.arg(help_behavior_hint="")  # None means: as the scenario has it
 
 
@@ -193,6 +194,40 @@ class DriveCommand(SimulationArguments):
         return {**super().run_fields(), "view": not self.no_view}
 
 
+@dataclass(frozen=True, kw_only=True)
+class BenchCommand(Common):
+    """Compare the controllers: an ablation over seeds, the time of every layer, the limit of pushes.
+
+    Runs are kept in the output folder; a bench that was stopped goes on where it stopped.
+    Exit status 1 where the full controller misses a stated limit.
+    """
+
+    parts: Annotated[str, tyro.conf.arg(metavar="PART,...")] = "ablation,timing"
+    """What to measure: ablation, timing, pushes."""
+    cases: Annotated[str, tyro.conf.arg(metavar="CASE,...")] = "walk-30,trot-100,payload,slope-up"
+    """Cases of the ablation (a wrong one lists all)."""
+    variants: Annotated[str, tyro.conf.arg(metavar="VARIANT,...", help_behavior_hint="")] = ""
+    """Rows of the ablation (all unless given); the others are compared with the first of them."""
+    seeds: int = 5
+    """Randomised robots for every case, from seed 0."""
+    duration: Annotated[float | None, _Unset] = None
+    """Length of the runs, s (each case's own unless given)."""
+    full: bool = False
+    """Everything: all cases over 20 seeds, all parts (hours)."""
+    workers: Annotated[int | None, _Unset] = None
+    """Processes for the runs (one per core unless given)."""
+    out: Path = Path("runs/bench")
+    """Folder for bench.json, bench.html and the results of the runs."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.seeds <= MAX_BENCH_SEEDS:
+            raise ConfigurationError(f"--seeds = {self.seeds} must lie in 1..{MAX_BENCH_SEEDS}")
+        if self.duration is not None and not 5.0 <= self.duration <= 600.0:
+            raise ConfigurationError(f"--duration = {self.duration:g} must lie in 5..600 seconds")
+        if self.workers is not None and self.workers < 1:
+            raise ConfigurationError(f"--workers = {self.workers} must be at least 1")
+
+
 ModelCommand = (
     Annotated[CheckCommand, tyro.conf.subcommand("check")]
     | Annotated[UrdfCommand, tyro.conf.subcommand("urdf")]
@@ -207,6 +242,7 @@ Command = (
         ModelCommand, tyro.conf.subcommand("model", description="Check and export the robot's model.")
     ]
     | Annotated[DriveCommand, tyro.conf.subcommand("drive")]
+    | Annotated[BenchCommand, tyro.conf.subcommand("bench")]
 )
 
 

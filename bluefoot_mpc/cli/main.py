@@ -28,6 +28,7 @@ _EXECUTE: dict[type, str] = {
     arguments.RomCommand: "model:rom",
     arguments.PowerCommand: "model:power",
     arguments.DriveCommand: "drive:drive",
+    arguments.BenchCommand: "bench:bench",
 }
 """Command to the function that runs it; imported late, so that ``--help`` is quick."""
 

@@ -21,11 +21,12 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "replay": (),
     "model": ("check", "urdf", "rom", "power"),
     "drive": (),
+    "bench": (),
 }
 """Commands, and the words that must follow them."""
 
 _DESCRIPTION = (
-    "The BlueFoot quadruped: simulate, walk, replay, drive. "
+    "The BlueFoot quadruped: simulate, walk, replay, drive, compare. "
     "'bluefoot COMMAND --help' lists a command's options, 'bluefoot --version' tells the version.\n\n"
     "Exit status: 0 all is well, 1 a criterion does not hold, 2 wrong use, 3 the device refused, "
     "130 interrupted."

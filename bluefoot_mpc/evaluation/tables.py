@@ -30,6 +30,21 @@ def spread(verdict: Verdict, figure: str) -> dict[str, float] | None:
     return {"median": statistics.median(known), "min": min(known), "max": max(known)}
 
 
+def limit_rows(verdict: Verdict) -> list[dict[str, Any]]:
+    """What was asked of a case and what was reached, limit by limit."""
+    return [
+        {
+            "case": verdict.case.name,
+            "figure": limit.figure,
+            "limit": limit.describe(),
+            "over": limit.over,
+            "value": verdict.value(limit),
+            "holds": verdict.holds(limit),
+        }
+        for limit in verdict.case.limits
+    ]
+
+
 def as_plain(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
     """Everything about every case, for ``figures.json``."""
     rows = []
@@ -43,16 +58,7 @@ def as_plain(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
                 "options": dict(case.options),
                 "seeds": list(case.seeds),
                 "passed": verdict.passed,
-                "limits": [
-                    {
-                        "figure": limit.figure,
-                        "limit": limit.describe(),
-                        "over": limit.over,
-                        "value": verdict.value(limit),
-                        "holds": verdict.holds(limit),
-                    }
-                    for limit in case.limits
-                ],
+                "limits": limit_rows(verdict),
                 "figures": {name: spread(verdict, name) for name in names},
             }
         )

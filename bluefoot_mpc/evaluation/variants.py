@@ -1,0 +1,54 @@
+"""Rows of the ablation: the paper's laws, and model-based control with its parts added one by one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bluefoot_mpc.exceptions import UnknownNameError
+
+NO_PREVIEW = "control.sway=static"
+NO_FEED_FORWARD = "control.servo.mixing=0"
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Variant:
+    """A controller with parts of it switched off.
+
+    Attributes:
+        name: as tables and options call it.
+        controller: what it is built from.
+        overrides: ``section.key=value``, what switches parts off.
+        meaning: one line for people.
+    """
+
+    name: str
+    controller: str
+    overrides: tuple[str, ...] = ()
+    meaning: str
+
+
+VARIANTS = (
+    Variant(name="cpg", controller="cpg", meaning="the paper's laws"),
+    Variant(
+        name="timing", controller="mpc", overrides=(NO_PREVIEW, NO_FEED_FORWARD),
+        meaning="gait, estimator and levelling of mpc; no model plans anything",
+    ),
+    Variant(
+        name="preview", controller="mpc", overrides=(NO_FEED_FORWARD,), meaning="and the ZMP preview",
+    ),
+    Variant(name="mpc", controller="mpc", meaning="and the planned torques fed forward: all of mpc"),
+)  # fmt: skip
+"""From the paper's laws to all of model-based control; the first is what the others are compared with."""
+
+
+def variants(names: tuple[str, ...] = ()) -> tuple[Variant, ...]:
+    """The variants of these names, all of them where none is given.
+
+    Raises:
+        UnknownNameError: there is no such variant.
+    """
+    known = {variant.name: variant for variant in VARIANTS}
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("variant", name, known)
+    return tuple(known[name] for name in known if name in names or not names)
