@@ -10,13 +10,14 @@ measured limit cycle serves every speed.
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.gait.couplings import Coupling, Matrix, scaled
-from bluefoot_mpc.gait.cpg import CpgConfig, CpgInputs, CpgIntegrator, CpgState, angle_fraction, on_circle
+from bluefoot_mpc.gait.cpg import CpgConfig, CpgInputs, CpgState, angle_fraction, on_circle, trajectory
 from bluefoot_mpc.types import FloatArray
 
 TABLE = 16  # intervals of the tables that turn angle into time
@@ -174,16 +175,12 @@ def mix(first: Rhythm, second: Rhythm, weight: float) -> Rhythm:
 
 def _simulate(coupling: Coupling, inputs: CpgInputs, config: CpgConfig) -> FloatArray:
     """(n, 8) states over some cycles at ω_s = 1, from the target phases."""
-    integrator = CpgIntegrator(config)
-    state = on_circle([-lag for lag in coupling.lag], inputs.alpha)
     cycle = np.pi / (inputs.alpha * (1.0 - inputs.alpha))
     count = int(_CYCLES * min(cycle, 60.0) / _STEP)
-    states = np.empty((count, 8))
-    for k in range(count):
-        state = integrator.advance(state, inputs, _STEP)
-        states[k, :4] = state.y1
-        states[k, 4:] = state.y2
-    return states
+    start = on_circle([-lag for lag in coupling.lag], inputs.alpha)
+    # Steps may have to be finer than the samples.
+    fine = max(1, math.ceil(0.5 * _STEP / config.max_step - 1e-9))
+    return trajectory(start, inputs, _STEP / fine, fine * count, config)[fine - 1 :: fine]
 
 
 def _crossing(values: FloatArray) -> FloatArray:

@@ -20,8 +20,11 @@ import numpy as np
 
 from bluefoot_mpc.codegen import compiled
 from bluefoot_mpc.settings import require_positive, require_range
+from bluefoot_mpc.types import FloatArray
 
 Four = tuple[float, float, float, float]
+CHAIN = 64
+"""Steps of a trajectory made in one call."""
 ONES: Four = (1.0, 1.0, 1.0, 1.0)
 _EIGHT = struct.Struct("8d")  # a small array filled number by number costs twice as much
 
@@ -111,6 +114,33 @@ class CpgIntegrator:
         return CpgState(y1=(a, b, c, d), y2=(e, f, g, h))
 
 
+def trajectory(state: CpgState, inputs: CpgInputs, dt: float, count: int, config: CpgConfig) -> FloatArray:
+    """(count, 8) states y1, y2 after each of `count` steps under constant inputs, as `advance` gives them.
+
+    Args:
+        state: oscillator states before the first step.
+        inputs: frequency, coupling and reflex.
+        dt: s; at most ``2 config.max_step / omega``.
+        count: number of steps.
+        config: constants of the oscillators.
+    """
+    chain = _chain(config.convergence, config.steepness, config.gamma)
+    buffer, call = chain.buffer()
+    parameters = (0.5 * dt, inputs.omega, inputs.alpha, *inputs.psi_omega, *inputs.psi_m)
+    start = np.array((*state.y1, *state.y2))
+    matrices, settings = np.tile(inputs.matrix, CHAIN), np.tile(parameters, CHAIN)
+    block = np.zeros((CHAIN, 8))
+    for index, array in enumerate((start, matrices, settings)):
+        buffer.set_arg(index, array.data)
+    buffer.set_res(0, block.data)
+    states = np.empty((-(-count // CHAIN) * CHAIN, 8))
+    for k in range(0, count, CHAIN):
+        call()
+        states[k : k + CHAIN] = block
+        start[:] = block[-1]
+    return states[:count]
+
+
 def advance(state: CpgState, inputs: CpgInputs, dt: float, config: CpgConfig) -> CpgState:
     """Roll the network forward: a pure function of its arguments.
 
@@ -168,6 +198,12 @@ def on_circle(phase: Sequence[float], share: float, radius: float = 1.0) -> CpgS
         y1.append(radius * math.cos(angle))
         y2.append(radius * math.sin(angle))
     return CpgState(y1=(y1[0], y1[1], y1[2], y1[3]), y2=(y2[0], y2[1], y2[2], y2[3]))
+
+
+@functools.lru_cache(maxsize=16)
+def _chain(convergence: float, steepness: float, gamma: float) -> Any:
+    """`CHAIN` times two Runge-Kutta steps, every second state kept."""
+    return _two_steps(convergence, steepness, gamma).mapaccum("cpg_chain", CHAIN)
 
 
 @functools.lru_cache(maxsize=16)

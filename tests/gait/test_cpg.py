@@ -15,6 +15,7 @@ from bluefoot_mpc.gait.cpg import (
     angle_fraction,
     derivative,
     on_circle,
+    trajectory,
 )
 from bluefoot_mpc.gait.network import coming_to_rest
 from bluefoot_mpc.gait.timing import GaitTiming, cycle_time, step_height, uncoupled_period
@@ -106,6 +107,14 @@ def test_advance_is_pure() -> None:
     integrator = CpgIntegrator(CpgConfig())
     integrator.advance(first, inputs, 0.3)
     assert integrator.advance(state, inputs, 0.01) == first
+
+
+@pytest.mark.parametrize("count", [1, 64, 65, 200])
+def test_a_trajectory_is_what_single_steps_give(count: int) -> None:
+    config, state = CpgConfig(), on_circle((0.0, 0.5, 0.4, 0.1), 0.3)
+    inputs = CpgInputs(omega=7.0, alpha=0.3, matrix=scaled(WALK.matrix, 0.15), psi_m=(1.0, 1.2, 1.0, 1.1))
+    states = trajectory(state, inputs, 0.02, count, config)
+    np.testing.assert_array_equal(states, roll(state, inputs, 0.02, count, config))
 
 
 @pytest.mark.parametrize("alpha", [0.2, 0.35, 0.5])
