@@ -20,6 +20,7 @@ from bluefoot_mpc.zmp.support_symbols import FAR, margin_function, region_functi
 
 __all__ = ["FAR", "Support", "SupportConfig", "SupportPreview", "support_margins"]
 
+_EACH = np.ones(4)
 _CHUNK = 256
 """Samples that a report measures at once."""
 
@@ -129,8 +130,9 @@ def standing_samples(schedule: ContactSchedule, feet: FloatArray, stance: FloatA
     """
     feet[:] = schedule.footholds[:, :, :2]
     stance[:] = schedule.stance
-    valid = np.logical_or.reduce(schedule.stance, axis=1)
-    if not valid.all():
+    count = stance.dot(_EACH)
+    valid: BoolArray = count > 0.0
+    if count.min() == 0.0:
         standing = np.flatnonzero(valid)
         if len(standing) == 0:
             stance[:] = 1.0
@@ -138,7 +140,7 @@ def standing_samples(schedule: ContactSchedule, feet: FloatArray, stance: FloatA
             before = np.searchsorted(standing, np.flatnonzero(~valid)) - 1
             source = standing[np.maximum(before, 0)]
             feet[~valid], stance[~valid] = feet[source], stance[source]
-    return np.asarray(valid)
+    return valid
 
 
 def support_margins(

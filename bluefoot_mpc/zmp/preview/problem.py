@@ -40,13 +40,15 @@ class PreviewProblem:
         self._time = np.float64(config.interval) * np.arange(1, n + 1)
         self.given, self.path = np.zeros((3 + 3 * n, 2)), np.zeros((4 * n, 2))
         self._wanted, self._nominal, self._velocity = self.given[3:].reshape(3, n, 2)
-        self._level = np.full(n, maps.lever)
+        self._level, self._ahead = np.full(n, maps.lever), np.array([1.0, 0.0])
+        self._usual_reach, self._starts = np.array(config.reach), np.array([0, 4 * n, 8 * n])
         self.levers = self._level.copy()
         self.normals, self._offsets = np.zeros((8 * n + 4, 2)), np.zeros((2 * n, 4))
         self.residuals, self._zmp = np.zeros(8 * n + 4), np.zeros((n, 2))
         self._plain, self._edges = np.zeros((n, 4)), np.zeros((n, 4, 2, 2))
         self._margin = np.zeros(n)
         self._valid: BoolArray = np.zeros(n, dtype=np.bool_)
+        self._known = False  # some sample has a foot
         self._bind(n)
 
     def _bind(self, n: int) -> None:
@@ -84,14 +86,13 @@ class PreviewProblem:
 
         Numbers that are not finite show in the residuals of any path.
         """
-        config, n = self._config, self._samples
+        n = self._samples
         self._valid = standing_samples(inputs.schedule, self._feet, self._stance)
         self.given[:3] = start
         self._nominal[:] = inputs.nominal
-        self._reach[:] = config.reach if inputs.reach is None else inputs.reach
-        if inputs.heading is None:
-            self._heading[:] = (1.0, 0.0)
-        else:
+        self._reach[:] = self._usual_reach if inputs.reach is None else inputs.reach
+        self._heading[:] = self._ahead
+        if inputs.heading is not None:
             self._heading[:, 0], self._heading[:, 1] = np.cos(inputs.heading), np.sin(inputs.heading)
         self._rows.call()
         self.normals[8 * n :] = self.normals[4 * n - 4 : 4 * n]
@@ -101,9 +102,10 @@ class PreviewProblem:
             self._velocity[:] = inputs.velocity
         else:
             np.subtract(self._nominal[1:], self._nominal[:-1], out=self._velocity[1:])
-            self._velocity[1:] *= 1.0 / config.interval
+            self._velocity[1:] *= 1.0 / self._config.interval
             self._velocity[0] = self._velocity[1]
-        return self._take_height(inputs) and bool(self._valid.any())
+        self._known = bool(self._valid.any())
+        return self._take_height(inputs) and self._known
 
     def read_way(self, start: FloatArray, goal: FloatArray) -> None:
         """Take the straight way from a (3, 2) start to a (2,) goal at the configured speed."""
@@ -123,13 +125,12 @@ class PreviewProblem:
 
     def plan(self, status: Fallback, iterations: int) -> ComPlan:
         """The plan of the path, evaluated before, with its margins and violations."""
-        n, residuals = self._samples, self.residuals
+        n = self._samples
         position, velocity, acceleration, jerk = self.path.copy().reshape(4, n, 2)
-        if self._valid.any():
+        if self._known:
             self._measure.call()
             margin, supported = self._margin.copy(), self._valid
-            parts = residuals[: 4 * n].min(), residuals[4 * n : 8 * n].min(), residuals[8 * n :].min()
-            slack = np.array([max(0.0, -float(part)) for part in parts])
+            slack = np.maximum(-np.minimum.reduceat(self.residuals, self._starts), 0.0)
         else:
             margin, supported, slack = np.full(n, np.nan), self._valid, np.full(3, np.nan)
         return ComPlan(

@@ -21,6 +21,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf
 
 from bluefoot_mpc.qp import QpProblem, QpSize, QpSolution
 from bluefoot_mpc.types import FloatArray
@@ -80,7 +81,6 @@ class PreviewProgram:
         self._by_shift = np.vstack([maps.forced @ maps.root, maps.root])
         self._levers = np.full(n, np.nan)
         self._responses = np.zeros((2 * n + 1, n))  # points per w
-        self._products = np.zeros((2 * n + 1, 2 * n + 1))
         weights = config.weights
         prices = np.repeat([weights.support_slack, weights.reach_slack, weights.capture_slack], [n, n, 1])
         self._softness = np.repeat(1.0 / prices, 4)
@@ -103,11 +103,13 @@ class PreviewProgram:
                 chosen = stage.choose(problem.residuals)
                 if chosen is None:
                     break
-                count, multiplier = stage.solve(self._gram(problem, chosen), free[chosen])
+                normals, responses = self._take_rows(problem, chosen)
+                gram = self._gram(normals, responses, chosen)
+                count, multiplier = stage.solve(gram, free[chosen])
                 iterations += count
                 if multiplier is None:
                     break
-                self._move(problem, optimum, chosen, multiplier)
+                self._move(problem, optimum, responses, multiplier[:, None] * normals)
                 outside = problem.residuals < -self._config.tolerance
                 outside[chosen] = False
                 if not outside.any():
@@ -125,7 +127,8 @@ class PreviewProgram:
         self._take_levers(problem.levers)
         optimum, free = problem.path.copy(), problem.residuals
         chosen = np.argsort(free)[: 2 * self._config.rows[-1]]
-        gram = self._gram(problem, chosen)
+        normals, responses = self._take_rows(problem, chosen)
+        gram = self._gram(normals, responses, chosen)
         scale = gram.diagonal() ** -0.5
         gram, free = scale[:, None] * gram * scale, scale * free[chosen]
         step = 1.0 / float(np.abs(gram).sum(axis=1).max())
@@ -136,7 +139,7 @@ class PreviewProgram:
             faster = 0.5 * (1.0 + math.sqrt(1.0 + 4.0 * momentum * momentum))
             point = following + (momentum - 1.0) / faster * (following - multiplier)
             multiplier, momentum = following, faster
-        self._move(problem, optimum, chosen, scale * multiplier)
+        self._move(problem, optimum, responses, (scale * multiplier)[:, None] * normals)
         near_enough = bool(problem.residuals.min() > -self._config.nearest_violation)
         return ProgramResult(solved=near_enough, iterations=_GRADIENT_STEPS)
 
@@ -149,23 +152,23 @@ class PreviewProgram:
         self._responses[:n] = position - levers[:, None] * acceleration
         self._responses[n : 2 * n] = position
         self._responses[2 * n] = position[-1] + math.sqrt(levers[-1]) * velocity[-1]
-        np.matmul(self._responses, self._responses.T, out=self._products)
 
-    def _gram(self, problem: PreviewProblem, chosen: Indices) -> FloatArray:
+    def _take_rows(self, problem: PreviewProblem, chosen: Indices) -> tuple[FloatArray, FloatArray]:
+        """(k, 2) normals of rows, and (k, n) responses of their points to w."""
+        return problem.normals.take(chosen, axis=0), self._responses.take(chosen >> 2, axis=0)
+
+    def _gram(self, normals: FloatArray, responses: FloatArray, chosen: Indices) -> FloatArray:
         """(k, k) products of the responses of rows, with their softness."""
-        point, normals = chosen >> 2, problem.normals[chosen]
-        gram: FloatArray = np.matmul(normals, normals.T)
-        gram *= self._products[point][:, point]
-        gram.reshape(-1)[:: len(chosen) + 1] += self._softness[chosen]
+        gram: FloatArray = responses @ responses.T
+        gram *= normals @ normals.T
+        gram.reshape(-1)[:: len(chosen) + 1] += self._softness.take(chosen)
         return gram
 
     def _move(
-        self, problem: PreviewProblem, optimum: FloatArray, chosen: Indices, multiplier: FloatArray
+        self, problem: PreviewProblem, optimum: FloatArray, responses: FloatArray, pull: FloatArray
     ) -> None:
-        """Put the path at the unconstrained optimum plus the responses of rows, and evaluate it."""
-        pull = multiplier[:, None] * problem.normals[chosen]
-        shift = self._responses[chosen >> 2].T @ pull
-        np.matmul(self._by_shift, shift, out=problem.path)
+        """Put the path at the unconstrained optimum less the responses to (k, 2) pulls, and evaluate it."""
+        np.matmul(self._by_shift, responses.T @ pull, out=problem.path)
         np.subtract(optimum, problem.path, out=problem.path)
         problem.evaluate()
 
@@ -181,16 +184,17 @@ class _Stage:
         """Rows with the smallest residuals; None when more are met than fit."""
         if self._count == len(residuals):
             return np.arange(self._count)
-        order = np.argpartition(residuals, self._count)
+        order = residuals.argpartition(self._count)
         return None if residuals[order[self._count]] <= 0.0 else order[: self._count]
 
     def solve(self, gram: FloatArray, free: FloatArray) -> tuple[int, FloatArray | None]:
         """Iterations, and the (k,) multipliers of the rows in 1/m; None without an answer."""
         problem = self._problem
-        try:
-            problem.matrix[:] = np.linalg.cholesky(gram)
-        except np.linalg.LinAlgError:
+        # LAPACK by itself: numpy's way to it costs four times as much at this size.
+        root, flag = dpotrf(gram.T, lower=1, clean=1, overwrite_a=1)
+        if flag != 0:
             return 0, None
+        problem.matrix[:] = root
         np.multiply(free, 1.0 / _UNIT, out=problem.upper)
         solution = self.solver.solve(problem)
         if not solution.ok:
