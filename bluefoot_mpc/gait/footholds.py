@@ -16,7 +16,6 @@ from bluefoot_mpc.gait.foothold_config import FootholdConfig, SwingShape
 from bluefoot_mpc.gait.swing import lift_profile, matched_step, smooth_step, spring_transition
 from bluefoot_mpc.gait.virtual_robot import VirtualPose, carried, point_velocity
 
-
 __all__ = [
     "Foot",
     "FootholdConfig",
