@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg.lapack import dposv
 
 from bluefoot_mpc.codegen import CodegenConfig, compiled
 from bluefoot_mpc.exceptions import ConfigurationError
@@ -80,7 +81,7 @@ class Assembly:
             self._upper[: model.joints], self._bounds, self._loaded,
         ]  # fmt: skip
         self._assemble = Buffers(compiled(assembly_function(model), build), [self.parameters], outputs)
-        inputs = [self.parameters, self._x, self._acceleration]
+        inputs = [self.parameters, self._x, self._acceleration, self._bounds]
         self._evaluate = Buffers(compiled(plan_function(model), build), inputs, [self.flat_plan])
         self.reset()
 
@@ -134,6 +135,12 @@ class Assembly:
         if stance is None:
             stance = self._stances[key] = self._new_stance(contact)
         return stance
+
+    def free_optimum(self, stance: Stance) -> FloatArray | None:
+        """(n,) the optimum without rows and bounds: where it breaks none of them, it is *the* optimum."""
+        # By rows or by columns is the same for a symmetric matrix, and LAPACK wants columns.
+        _, x, failed = dposv(stance.problem.hessian.T, stance.problem.gradient)
+        return None if failed else np.negative(x, out=x)
 
     def evaluate(self, stance: Stance, x: FloatArray) -> None:
         """Write the plan that an answer means to `plan`."""
@@ -220,3 +227,4 @@ class Assembly:
         given.lower[:] = np.maximum(actuators.lower + config.joint_margin, -_NO_LIMIT)
         given.upper[:] = np.minimum(actuators.upper - config.joint_margin, _NO_LIMIT)
         given.braking[:] = config.joint_acceleration
+        given.friction[:] = config.friction

@@ -58,6 +58,7 @@ class WholeBodyConfig:
     weights: WholeBodyWeights = field(default_factory=WholeBodyWeights)
     gains: WholeBodyGains = field(default_factory=WholeBodyGains)
     solver: str = "daqp"  # a name of qp.SOLVERS
+    free_first: bool = True  # try the optimum without limits first: mostly it keeps them, and costs a tenth
     friction: float = 0.5  # coefficient that the friction pyramids assume
     force_limit: float = 2.0  # of the robot's weight, largest normal force of a foot
     force_ramp: float = (

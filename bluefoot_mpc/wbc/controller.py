@@ -15,6 +15,9 @@ from bluefoot_mpc.wbc.ladder import into_limits, nearest_point, static_forces, s
 from bluefoot_mpc.wbc.model import WholeBodyModel
 from bluefoot_mpc.wbc.problem import plan_layout
 
+_VIOLATION = (
+    1e-4  # of the largest torque, force and acceleration: an answer of a solver that breaks more is not used
+)
 _RESIDUAL = 1e-6  # of the weight: a plan that misses the dynamics by more is not used
 _AT_LIMIT = 1e-5  # N·m
 _NO_FOOT = "no foot stands: the plan has no ground force"
@@ -36,6 +39,7 @@ class WholeBodyController:
         self.model, self.config = model, config or WholeBodyConfig()
         self._assembly = Assembly(model, self.config)
         self._layout = plan_layout(model)
+        self._residual = _RESIDUAL * model.weight
         options = SolverOptions(warm_start=False)
         feet = len(model.feet)
         sizes = [self._assembly.stance(np.arange(feet) < count).problem.size for count in range(feet + 1)]
@@ -61,17 +65,25 @@ class WholeBodyController:
         Raises:
             ConfigurationError: an input has not the length that this robot needs.
         """
-        contact, assembly = inputs.contact, self._assembly
+        contact, assembly = np.asarray(inputs.contact, dtype=np.bool_), self._assembly
         if not assembly.fill(inputs, dt):
             return self._substitute(contact, _NOT_FINITE, dt)
         stance = assembly.assemble(contact)
-        solution = self._solvers[stance.feet].solve(stance.problem)
         self._known = inputs.q
-        if solution.status is QpStatus.SOLVED:
-            assembly.evaluate(stance, solution.x)
-            if assembly.plan.residual[0] <= _RESIDUAL * self.model.weight:
-                return self._kept(self._plan(stance, solution.iterations))
+        if self.config.free_first:
+            x = assembly.free_optimum(stance)
+            if x is not None and self._holds(stance, x, 0.0):
+                return self._kept(self._plan(stance, 0))
+        solution = self._solvers[stance.feet].solve(stance.problem)
+        if solution.status is QpStatus.SOLVED and self._holds(stance, solution.x, _VIOLATION):
+            return self._kept(self._plan(stance, solution.iterations))
         return self._nearest(stance, contact, f"{self.config.solver}: {solution.status}", dt)
+
+    def _holds(self, stance: Stance, x: FloatArray, tolerance: float) -> bool:
+        """Evaluate an answer; True where it keeps dynamics, rows and bounds (False for NaN)."""
+        self._assembly.evaluate(stance, x)
+        plan = self._assembly.plan
+        return bool(plan.violation[0] <= tolerance and plan.residual[0] <= self._residual)
 
     def _kept(self, plan: WholeBodyPlan) -> WholeBodyPlan:
         self._previous, self._without = plan, 0.0
@@ -100,7 +112,7 @@ class WholeBodyController:
             return self._substitute(contact, f"{cause}, and no nearest point", dt)
         self._assembly.evaluate(stance, into_limits(self.model, stance.problem, x, self.config.friction))
         plan = self._plan(stance, 0)
-        if not plan.residual <= _RESIDUAL * self.model.weight:  # NaN too
+        if not plan.residual <= self._residual:  # NaN too
             return self._substitute(contact, f"{cause}, and a nearest point that breaks the dynamics", dt)
         lowest, highest = self._envelope()
         torque = np.clip(plan.torque, lowest, highest)

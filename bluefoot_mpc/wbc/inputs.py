@@ -68,9 +68,9 @@ class WholeBodyPlan:
         com_acceleration: (3,) m/s², of the centre of mass, world.
         foot_acceleration: (k, 3) m/s², of the foot points, world; what a standing foot has left is its slack.
         status: rung of the ladder that the plan comes from.
-        residual: N and N·m, largest error of the equations of motion; inf where the
-            plan does not belong to this tick's state.
-        iterations: of the solver.
+        residual: N and N·m, error of the equations of motion; inf where the plan does not
+            belong to this tick's state.
+        iterations: of the solver; 0 where the optimum without limits kept them all.
         saturated: (nj,) True where the torque lies at its envelope.
         reason: why the plan is not the optimum, or what a person should know; "" when all is well.
     """

@@ -68,7 +68,7 @@ def parameter_layout(model: WholeBodyModel) -> Layout:
         "com_gain": 2, "trunk_gain": 2, "momentum_gain": 1, "contact_gain": 1, "swing_gain": 2,
         "posture_gain": 2, "force_limit": 1, "ramp": 1,
         "torque": joints, "back_emf": joints, "speed": joints, "lower": joints, "upper": joints,
-        "braking": 1,
+        "braking": 1, "friction": 1,
     }  # fmt: skip
     changing = {"loaded": len(model.feet), "strength": 1, "horizon": 1, "dt": 1}
     return Layout({**input_sizes(model), **changing, **configured})

@@ -77,13 +77,15 @@ def plan_layout(model: WholeBodyModel) -> Layout:
 
     ``acceleration`` Pinocchio's v̇, ``force`` (N, world) of each foot, ``torque`` (N·m), ``com`` and
     ``feet`` accelerations (m/s², world), ``spare`` (N·m) distance of each torque to its
-    envelope, ``residual`` largest error of the base's equations (N, N·m).
+    envelope, ``violation`` by how much rows and bounds are broken at most (of the largest
+    torque and acceleration, and of the unit of force; not positive where all hold),
+    ``residual`` norm of what the base's equations lack (N, N·m).
     """
     feet = 3 * len(model.feet)
     return Layout(
         {
             "acceleration": model.pin_model.nv, "force": feet, "torque": model.joints, "com": 3,
-            "feet": feet, "spare": model.joints, "residual": 1,
+            "feet": feet, "spare": model.joints, "violation": 1, "residual": 1,
         }
     )  # fmt: skip
 
@@ -92,11 +94,13 @@ def plan_function(model: WholeBodyModel) -> ca.Function:
     """The plan that the unknowns mean, by inverse dynamics: another algorithm than the problem's.
 
     Inputs: the flat parameters, ``x`` of all feet (0 without contact), ``base`` (6,) its
-    acceleration in world axes at the centre of mass. Output: `plan_layout`.
+    acceleration in world axes at the centre of mass, ``bounds`` as `assembly_function` gives
+    them. Output: `plan_layout`.
     """
     vector, given = parameter_layout(model).symbols()
     count, joints = len(model.feet), model.joints
     x, base = ca.SX.sym("x", joints + 3 * count), ca.SX.sym("base", BASE)
+    bounds = ca.SX.sym("bounds", joints + 3 * count, 4)
     rotation = quaternion_matrix(given.q[3:7])
     com = SymbolicTree(model.pin_model, _state(model, given)).com
     linear = base[:3] + ca.cross(com, base[3:])  # at the base's origin
@@ -112,17 +116,35 @@ def plan_function(model: WholeBodyModel) -> ca.Function:
         lacking[1] = lacking[1] - ca.cross(foot.position - tree.com, push)
         torque = torque - foot.jacobian.T @ push
     lowest, highest = torque_bounds(given.torque, given.strength, given.back_emf, given.v[BASE:])
+    spare = ca.fmin(highest - torque, torque - lowest)
     outputs = {
         "acceleration": ca.vertcat(rotation.T @ linear, rotation.T @ base[3:], x[:joints]),
         "force": ca.vertcat(*pushes),
         "torque": torque,
         "com": tree.linear_bias / tree.mass + ca.DM(model.pin_model.gravity.linear),
         "feet": ca.vertcat(*[foot.drift for foot in feet]),
-        "spare": ca.fmin(highest - torque, torque - lowest),
-        "residual": ca.mmax(ca.fabs(ca.vertcat(*lacking))),
+        "spare": spare,
+        "violation": ca.mmax(ca.vertcat(-spare / given.torque, _broken(x, bounds, joints, given))),
+        # A norm, not a largest entry: it is NaN as soon as anything is.
+        "residual": ca.norm_2(ca.vertcat(*lacking)),
     }
     flat = ca.vertcat(*[outputs[name] for name in plan_layout(model).slices])
-    return _function("whole_body_plan", {"parameters": vector, "x": x, "base": base}, {"plan": flat})
+    inputs = {"parameters": vector, "x": x, "base": base, "bounds": bounds}
+    return _function("whole_body_plan", inputs, {"plan": flat})
+
+
+def _broken(x: Any, bounds: Any, joints: int, given: SimpleNamespace) -> Any:
+    """By how much each bound and each side of the friction pyramids is broken; negative where it holds."""
+    change, force = slice(0, joints), slice(joints + 2, None, 3)
+    parts = [
+        (x[change] - bounds[change, 3]) / given.braking,
+        (bounds[change, 2] - x[change]) / given.braking,
+        x[force] - bounds[force, 3],
+        -x[force],
+    ]
+    for tangent in (joints, joints + 1):
+        parts.append(ca.fabs(x[tangent::3]) - given.friction * x[force])
+    return ca.vertcat(*parts)
 
 
 def _state(

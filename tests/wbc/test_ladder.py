@@ -1,6 +1,7 @@
 """What stands in when there is no optimum: tested with a solver that fails on purpose."""
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
@@ -28,10 +29,22 @@ class Failing:
         self.real.reset()
 
 
+@functools.cache
+def shared() -> WholeBodyController:
+    return WholeBodyController(bluefoot())
+
+
+def fresh() -> WholeBodyController:
+    made = shared()
+    made.reset()
+    return made
+
+
 @pytest.fixture
 def broken(monkeypatch: pytest.MonkeyPatch) -> WholeBodyController:
     """A controller whose solvers all fail until told otherwise."""
-    made = WholeBodyController(bluefoot(), WholeBodyConfig())
+    made = fresh()
+    monkeypatch.setattr(made, "config", WholeBodyConfig(free_first=False))
     monkeypatch.setattr(made, "_solvers", [Failing(solver) for solver in made._solvers])
     return made
 
@@ -63,6 +76,16 @@ def test_nearest_point_stands_in_for_a_solver_that_fails(
     assert dynamics_error(bluefoot(), inputs, plan) < 1e-8
 
 
+def test_quiet_standing_needs_no_solver(broken: WholeBodyController, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the optimum without limits keeps them, no solver is asked."""
+    monkeypatch.setattr(broken, "config", WholeBodyConfig())
+    plan = broken.step(standing(bluefoot()), DT)
+    assert plan.status is Fallback.SOLVED
+    assert plan.iterations == 0
+    # Two legs at a twentieth of their torque: limits bind.
+    assert broken.step(standing(bluefoot(), [1, 0, 0, 1], derating=0.05), DT).status is Fallback.NEAREST
+
+
 def test_nearest_point_is_near_the_optimum(broken: WholeBodyController) -> None:
     rng = np.random.default_rng(1)
     for _ in range(30):
@@ -82,7 +105,7 @@ def test_nearest_point_is_near_the_optimum(broken: WholeBodyController) -> None:
 
 
 def test_infeasible_states_end_on_the_ladder() -> None:
-    made, rng = WholeBodyController(bluefoot(), WholeBodyConfig()), np.random.default_rng(2)
+    made, rng = fresh(), np.random.default_rng(2)
     rungs = set()
     for _ in range(150):
         plan = made.step(sample_inputs(bluefoot(), rng, Spread().scaled(6.0)), DT)
@@ -93,9 +116,10 @@ def test_infeasible_states_end_on_the_ladder() -> None:
     assert rungs == {Fallback.SOLVED, Fallback.NEAREST}
 
 
-def test_previous_plan_then_stance_then_sit() -> None:
+def test_previous_plan_then_stance_then_sit(monkeypatch: pytest.MonkeyPatch) -> None:
     """A state that is not known: the rungs follow each other in time, and recovery is immediate."""
-    made = WholeBodyController(bluefoot(), WholeBodyConfig(shift_time=0.05, stance_time=0.1))
+    made = fresh()
+    monkeypatch.setattr(made, "config", WholeBodyConfig(shift_time=0.05, stance_time=0.1))
     inputs = standing(bluefoot())
     good = made.step(inputs, DT)
     blind = dataclasses.replace(inputs, q=np.full(23, np.nan))
@@ -116,7 +140,7 @@ def test_previous_plan_then_stance_then_sit() -> None:
     "field", ["q", "v", "com", "trunk", "foot", "com_acceleration", "posture", "remaining"]
 )
 def test_nan_anywhere_never_reaches_the_plan(field: str) -> None:
-    made = WholeBodyController(bluefoot(), WholeBodyConfig())
+    made = fresh()
     inputs = standing(bluefoot(), com_acceleration=np.zeros(3), posture=bluefoot().posture[7:].copy())
     inputs = dataclasses.replace(inputs, remaining=np.full(4, 0.3))
     value = np.array(getattr(inputs, field), dtype=float)
@@ -129,7 +153,7 @@ def test_nan_anywhere_never_reaches_the_plan(field: str) -> None:
 
 
 def test_shifted_plan_lets_lifted_feet_go() -> None:
-    made = WholeBodyController(bluefoot(), WholeBodyConfig())
+    made = fresh()
     inputs = standing(bluefoot())
     made.step(inputs, DT)
     lifted = dataclasses.replace(inputs, v=np.full(22, np.nan), contact=np.array([True, False, True, True]))
@@ -140,7 +164,7 @@ def test_shifted_plan_lets_lifted_feet_go() -> None:
 
 
 def test_blind_in_the_air_asks_for_no_force() -> None:
-    made = WholeBodyController(bluefoot(), WholeBodyConfig())
+    made = fresh()
     blind = dataclasses.replace(standing(bluefoot(), [0, 0, 0, 0]), q=np.full(23, np.nan))
     plan = made.step(blind, DT)
     assert plan.status is Fallback.STANCE
@@ -150,7 +174,7 @@ def test_blind_in_the_air_asks_for_no_force() -> None:
 
 def test_singular_stance_is_solved() -> None:
     """All feet in one place under the trunk, and legs stretched out: slack, not failure."""
-    made = WholeBodyController(bluefoot(), WholeBodyConfig())
+    made = fresh()
     q = bluefoot().posture.copy()
     q[7:] = 0.0
     inputs = dataclasses.replace(standing(bluefoot()), q=q)
