@@ -28,11 +28,14 @@ def farthest_edge(walker: Gait, fast: ContactSchedule, true: ContactSchedule) ->
     return farthest
 
 
-def compare(walker: Gait, inputs, ticks: int) -> tuple[float, float]:
-    """Worst edge (s) and worst foothold (m) of the closed form over some ticks."""
+def compare(walker: Gait, inputs, ticks: int, every: int = 4) -> tuple[float, float]:
+    """Worst edge (s) and worst foothold (m) of the closed form over some ticks, one in `every`."""
     edge = error = 0.0
-    for _ in range(ticks):
+    for tick in range(ticks):
         walker.step(inputs, DT)
+        if tick % every:
+            walker.schedule(HORIZON, STEP)  # as on every tick: it may remember
+            continue
         kept = copy.deepcopy(walker.state)
         fast = walker.schedule(HORIZON, STEP)
         assert walker.state == kept
@@ -53,7 +56,7 @@ def test_steady_contacts_are_right_to_a_substep_and_footholds_to_a_millimetre(
     walker = Gait(config, STANCE)
     inputs = command(twist[0], twist[1], gait, twist[2])
     drive(walker, inputs, 6.0)
-    edge, error = compare(walker, inputs, 30)
+    edge, error = compare(walker, inputs, 30, 3)
     assert edge <= config.substep + 0.006
     assert error < (1e-3 if gait == "trot" else 2.5e-3)  # a walk's legs do not pace quite evenly
 
@@ -80,7 +83,7 @@ def test_between_gaits_and_on_the_way_to_rest_the_network_is_rolled() -> None:
     walker = make(foothold=SMOOTH)
     drive(walker, command(0.06), 2.0)
     for inputs, ticks in ((command(0.06, gait="walk"), 250), (command(gait="walk"), 120)):
-        edge, error = compare(walker, inputs, ticks)
+        edge, error = compare(walker, inputs, ticks, 7)
         assert edge <= 0.026
         assert error < 0.006
     plan = walker.schedule(HORIZON, STEP)
