@@ -34,6 +34,7 @@ _UNIT = 1e-3
 _GRADIENT_STEPS = 200
 
 Indices = NDArray[np.intp]
+_NOTHING: Indices = np.zeros(0, dtype=np.intp)
 
 
 class Solver(Protocol):
@@ -84,8 +85,11 @@ class PreviewProgram:
         weights = config.weights
         prices = np.repeat([weights.support_slack, weights.reach_slack, weights.capture_slack], [n, n, 1])
         self._softness = np.repeat(1.0 / prices, 4)
+        counts = [size.rows for size in sizes(config)]
+        # The whole problem costs so much that the one before it is given all its rounds.
+        rooms = [*counts[:-2], counts[-1], counts[-1]][-len(counts) :]
         self._stages = tuple(
-            _Stage(solver, size.rows) for solver, size in zip(solvers, sizes(config), strict=True)
+            _Stage(solver, count, room) for solver, count, room in zip(solvers, counts, rooms, strict=True)
         )
 
     def reset(self) -> None:
@@ -97,12 +101,10 @@ class PreviewProgram:
         """Turn the problem's path from the unconstrained optimum, evaluated before, into the optimum."""
         self._take_levers(problem.levers)
         optimum, free = problem.path.copy(), problem.residuals.copy()
-        iterations = 0
+        iterations, met = 0, _NOTHING
         for stage in self._stages:
             for _ in range(self._config.rounds):
-                chosen = stage.choose(problem.residuals)
-                if chosen is None:
-                    break
+                chosen = stage.choose(problem.residuals, met)
                 normals, responses = self._take_rows(problem, chosen)
                 gram = self._gram(normals, responses, chosen)
                 count, multiplier = stage.solve(gram, free[chosen])
@@ -114,6 +116,9 @@ class PreviewProgram:
                 outside[chosen] = False
                 if not outside.any():
                     return ProgramResult(solved=True, iterations=iterations)
+                met = chosen[multiplier > 0.0]
+                if len(met) + np.count_nonzero(outside) > stage.room:
+                    break
         problem.path[:] = optimum
         problem.evaluate()
         return ProgramResult(solved=False, iterations=iterations)
@@ -174,18 +179,31 @@ class PreviewProgram:
 
 
 class _Stage:
-    """One solver and its problem."""
+    """One solver and its problem.
 
-    def __init__(self, solver: Solver, count: int) -> None:
-        self.solver, self._count = solver, count
+    Attributes:
+        solver: the backend.
+        room: rows, met or broken, beyond which the next stage takes over.
+
+    Args:
+        solver: the backend.
+        count: rows of a problem.
+        room: see above.
+    """
+
+    def __init__(self, solver: Solver, count: int, room: int) -> None:
+        self.solver, self._count, self.room = solver, count, room
         self._problem = QpProblem.empty(QpSize(variables=count, rows=count))
 
-    def choose(self, residuals: FloatArray) -> Indices | None:
-        """Rows with the smallest residuals; None when more are met than fit."""
-        if self._count == len(residuals):
-            return np.arange(self._count)
-        order = residuals.argpartition(self._count)
-        return None if residuals[order[self._count]] <= 0.0 else order[: self._count]
+    def choose(self, residuals: FloatArray, met: Indices) -> Indices:
+        """The rows that were met and those with the smallest residuals."""
+        count = self._count
+        if count == len(residuals):
+            return np.arange(count)
+        if len(met) > 0:
+            residuals = residuals.copy()
+            residuals[met] = -np.inf
+        return residuals.argpartition(count)[:count]
 
     def solve(self, gram: FloatArray, free: FloatArray) -> tuple[int, FloatArray | None]:
         """Iterations, and the (k,) multipliers of the rows in 1/m; None without an answer."""
