@@ -11,7 +11,7 @@ from bluefoot_mpc.types import BoolArray, Fallback, FloatArray
 from bluefoot_mpc.wbc.assembly import Assembly, Stance
 from bluefoot_mpc.wbc.config import WholeBodyConfig
 from bluefoot_mpc.wbc.inputs import WholeBodyInputs, WholeBodyPlan
-from bluefoot_mpc.wbc.ladder import into_limits, nearest_point, static_forces, static_torque
+from bluefoot_mpc.wbc.ladder import into_limits, nearest_point, static_forces, static_torque, widened
 from bluefoot_mpc.wbc.model import WholeBodyModel
 from bluefoot_mpc.wbc.problem import plan_layout
 
@@ -43,13 +43,14 @@ class WholeBodyController:
         options = SolverOptions(warm_start=False)
         feet = len(model.feet)
         sizes = [self._assembly.stance(np.arange(feet) < count).problem.size for count in range(feet + 1)]
+        self._spare: dict[int, Solver] = {}  # for problems with wider limits, by standing feet
         self._solvers: list[Solver] = [make_solver(self.config.solver, size, options) for size in sizes]
         self.reset()
 
     def reset(self) -> None:
         """The state after init: no plan before, every foot carries fully."""
         self._assembly.reset()
-        for solver in self._solvers:
+        for solver in (*self._solvers, *self._spare.values()):
             solver.reset()
         self._previous: WholeBodyPlan | None = None
         self._known = self.model.posture
@@ -106,8 +107,8 @@ class WholeBodyController:
         )
 
     def _nearest(self, stance: Stance, contact: BoolArray, cause: str, dt: float) -> WholeBodyPlan:
-        """The same problem with its limits as penalties; torques are then cut to the envelope."""
-        x = nearest_point(stance.problem)
+        """The problem with wider limits; torques are then cut to the envelope."""
+        x, how = self._relaxed(stance)
         if x is None:
             return self._substitute(contact, f"{cause}, and no nearest point", dt)
         self._assembly.evaluate(stance, into_limits(self.model, stance.problem, x, self.config.friction))
@@ -119,9 +120,23 @@ class WholeBodyController:
         lacking = float(np.abs(torque - plan.torque).max())
         plan = dataclasses.replace(
             plan, torque=torque, status=Fallback.NEAREST, residual=max(plan.residual, lacking),
-            reason=f"nearest point: {cause}",
+            reason=f"{how}: {cause}",
         )  # fmt: skip
         return self._kept(plan)
+
+    def _relaxed(self, stance: Stance) -> tuple[FloatArray | None, str]:
+        """(n,) an answer of wider limits by the solver, else without it; and how it came about."""
+        model, problem = self.model, stance.problem
+        torque = float(np.max(self._assembly.given.torque))
+        wide = widened(problem, model.joints, self.config.joint_acceleration / torque)
+        solver = self._spare.get(stance.feet)
+        if solver is None:
+            solver = make_solver(self.config.solver, wide.size, SolverOptions(warm_start=False))
+            self._spare[stance.feet] = solver
+        solution = solver.solve(wide)
+        if solution.status is QpStatus.SOLVED:
+            return solution.x[:-1], "wider limits"
+        return nearest_point(problem), "nearest point"
 
     def _substitute(self, contact: BoolArray, cause: str, dt: float) -> WholeBodyPlan:
         """A plan that does not come from this tick: the previous one, then the static stance."""

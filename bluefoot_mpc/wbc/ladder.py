@@ -1,6 +1,6 @@
-"""What stands in for the optimum when there is none: nearest point, static stance.
+"""What stands in for the optimum when there is none: widened limits, nearest point, static stance.
 
-Neither is on the hot path: both allocate, and take tenths of a millisecond.
+None of it is on the hot path: all of it allocates, and takes tenths of a millisecond.
 """
 
 from __future__ import annotations
@@ -13,20 +13,55 @@ from bluefoot_mpc.types import BoolArray, FloatArray
 from bluefoot_mpc.wbc.constraints.friction import onto_pyramid
 from bluefoot_mpc.wbc.model import WholeBodyModel
 
-_ROUNDS = 40
-_SHORTEST = 1e-6  # step of the line search
-_SETTLED = 1e-12  # fall of the cost that a step promises, relative
+_ROUNDS = 15
+_SHORTEST = 1e-3  # step of the line search
+_SETTLED = 1e-9  # fall of the cost that a step promises, relative
+_WIDENING = 1e3  # cost of widened limits, over the largest of the problem's diagonal
 _PENALTY = 1e4  # of a squared violation, over the mean of the cost's diagonal
+
+
+def widened(problem: QpProblem, joints: int, unit: float) -> QpProblem:
+    """The same problem with one more unknown, by which all limits of torque and acceleration give way.
+
+    What makes a whole-body problem infeasible is these two against each other;
+    forces alone can always be zero. The least common widening is wanted before
+    everything else.
+
+    Args:
+        problem: n unknowns, the first `joints` accelerations, and as many rows of torque first.
+        joints: number of joints.
+        unit: rad/s² of acceleration limits given up per N·m of torque limits.
+    """
+    size, rows = len(problem.gradient), len(problem.lower)
+    hessian = np.zeros((size + 1, size + 1))
+    hessian[:size, :size] = problem.hessian
+    hessian[size, size] = _WIDENING * float(np.max(np.diagonal(problem.hessian)))
+    change = np.eye(joints, size)
+    soft = np.vstack([problem.matrix[:joints], change])
+    give = np.concatenate([np.ones(joints), np.full(joints, unit)])[:, None]
+    upper = np.concatenate([problem.upper[:joints], problem.ceiling[:joints]])
+    lower = np.concatenate([problem.lower[:joints], problem.floor[:joints]])
+    hard = np.hstack([problem.matrix[joints:], np.zeros((rows - joints, 1))])
+    endless = np.full(2 * joints, np.inf)
+    free = np.full(joints, np.inf)
+    return QpProblem(
+        hessian=hessian,
+        gradient=np.append(problem.gradient, 0.0),
+        matrix=np.ascontiguousarray(np.vstack([np.hstack([soft, -give]), np.hstack([soft, give]), hard])),
+        lower=np.concatenate([-endless, lower, problem.lower[joints:]]),
+        upper=np.concatenate([upper, endless, problem.upper[joints:]]),
+        floor=np.concatenate([-free, problem.floor[joints:], [0.0]]),
+        ceiling=np.concatenate([free, problem.ceiling[joints:], [np.inf]]),
+    )
 
 
 def nearest_point(problem: QpProblem) -> FloatArray | None:
     """(n,) the optimum with rows and bounds as steep penalties; None where even that has none.
 
-    Works on problems without a feasible point: newton's method on a convex function that
-    is quadratic in pieces, with a line search, so that it cannot cycle.
+    Needs no solver: Newton's method on a convex function that is quadratic in pieces,
+    with a line search, so that it cannot cycle, and few steps, so that it cannot be late.
     """
-    size = len(problem.gradient)
-    matrix = np.vstack([problem.matrix, np.eye(size)])
+    matrix = np.vstack([problem.matrix, np.eye(len(problem.gradient))])
     lower = np.concatenate([problem.lower, problem.floor])
     upper = np.concatenate([problem.upper, problem.ceiling])
     hessian, gradient = problem.hessian, problem.gradient
@@ -35,27 +70,29 @@ def nearest_point(problem: QpProblem) -> FloatArray | None:
         or np.isnan([lower, upper]).any()
     ):
         return None
-    penalty = _PENALTY * float(np.trace(hessian)) / size
-
-    def excess(x: FloatArray) -> FloatArray:
-        value = matrix @ x
-        return np.asarray(value - np.clip(value, lower, upper))
-
-    def cost(x: FloatArray) -> float:
-        over = excess(x)
-        return float(0.5 * x @ hessian @ x + gradient @ x + 0.5 * penalty * over @ over)
-
-    x = np.clip(np.zeros(size), problem.floor, problem.ceiling)
+    penalty = _PENALTY * float(np.trace(hessian)) / len(gradient)
+    x = np.clip(np.zeros(len(gradient)), problem.floor, problem.ceiling)
     for _ in range(_ROUNDS):
-        over = excess(x)
+        value = matrix @ x
+        over = value - np.clip(value, lower, upper)
         rows = matrix[over != 0.0]
         slope = hessian @ x + gradient + penalty * matrix.T @ over
-        step = -np.linalg.solve(hessian + penalty * rows.T @ rows, slope)
-        start, descent, length = cost(x), float(slope @ step), 1.0
-        while cost(x + length * step) > start + 1e-4 * length * descent and length > _SHORTEST:
+        try:
+            step = -np.linalg.solve(hessian + penalty * rows.T @ rows, slope)
+        except np.linalg.LinAlgError:  # numbers too large to add up
+            return None
+        descent, change, length = float(slope @ step), matrix @ step, 1.0
+        first, second = float((hessian @ x + gradient) @ step), float(step @ hessian @ step)
+        before = penalty * float(over @ over)
+        while length > _SHORTEST:
+            moved = value + length * change
+            moved -= np.clip(moved, lower, upper)
+            rise = length * first + 0.5 * length * length * second
+            if rise + 0.5 * (penalty * float(moved @ moved) - before) <= 1e-4 * length * descent:
+                break
             length *= 0.5
         x = x + length * step
-        if -descent <= _SETTLED * (1.0 + abs(start)):
+        if -descent <= _SETTLED * (1.0 + abs(first) + before):
             break
     return x if np.isfinite(x).all() else None
 
