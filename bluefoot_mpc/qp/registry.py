@@ -70,7 +70,7 @@ _ENTRIES = {
     "scs": _Entry(make=_general("scs"), module="scs", package="scs"),
     **{
         f"casadi-{plugin}": _Entry(make=_conic(plugin), module="casadi", package="casadi")
-        for plugin in ("qrqp", "qpoases", "osqp", "daqp", "highs", "proxqp")
+        for plugin in ("qrqp", "qpoases", "osqp", "daqp", "proxqp")
     },
 }
 

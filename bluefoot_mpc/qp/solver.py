@@ -44,6 +44,7 @@ class Solver(abc.ABC):
         self._excess = np.zeros(total)
         self._nearest = np.zeros(total)
         self._acceptance_squared = options.acceptance**2
+        self._crossed = np.zeros(total, dtype=np.bool_)
         self._nothing = np.full(n, np.nan)
         self._checked_matrices = False
 
@@ -61,8 +62,9 @@ class Solver(abc.ABC):
         if problem.matrix.shape != self._shape:
             raise ConfigurationError(f"solver for {self.size} was given a problem of {problem.size}")
         if not self._load(problem):
-            self._forget()
             return self._failure(QpStatus.FAILED)
+        if np.count_nonzero(np.greater(self._low, self._high, out=self._crossed)):
+            return self._failure(QpStatus.INFEASIBLE)
         answer = self._solve(problem)
         if answer.status is QpStatus.SOLVED and not self._holds(answer.x, problem.matrix):
             self._forget()

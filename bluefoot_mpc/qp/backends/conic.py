@@ -36,16 +36,6 @@ def _daqp(options: SolverOptions) -> dict[str, Any]:
     return {"daqp": {"primal_tol": options.tolerance, "iter_limit": options.max_iterations}}
 
 
-def _highs(options: SolverOptions) -> dict[str, Any]:
-    return {
-        "highs": {
-            "output_flag": False, "qp_iteration_limit": options.max_iterations * _FIRST_ORDER_STEPS,
-            "primal_feasibility_tolerance": max(options.tolerance, 1e-10),
-            "dual_feasibility_tolerance": max(options.tolerance, 1e-10),
-        }
-    }  # fmt: skip
-
-
 def _proxqp(options: SolverOptions) -> dict[str, Any]:
     return {"proxqp": {"eps_abs": options.tolerance, "max_iter": options.max_iterations}}
 
@@ -55,16 +45,14 @@ PLUGINS: dict[str, Callable[[SolverOptions], dict[str, Any]]] = {
     "qpoases": _qpoases,
     "osqp": _osqp,
     "daqp": _daqp,
-    "highs": _highs,
     "proxqp": _proxqp,
 }
 """Plugins by CasADi's names, with their options.
 
 Of the others clp and cbc solve linear programs only, hpipm and fatrop want stages,
-superscs takes 0.2 s a problem, ipqp and piqp print.
+superscs takes 0.2 s a problem, ipqp and piqp print, and highs crashes the process where
+the highspy package is loaded too, as by qpsolvers.
 """
-
-_MEMORIES = 8
 
 
 class ConicSolver(Solver):
@@ -81,8 +69,10 @@ class ConicSolver(Solver):
         settings = {"error_on_fail": False, "print_time": False, **PLUGINS[self._plugin](self.options)}
         self._function = function = ca.conic("solver", self._plugin, shapes, settings)
         buffer: Any
+        # The buffer will take the memory that is free now; statistics are asked for by its number.
+        self._memory = function.checkout()
+        function.release(self._memory)
         buffer, self._evaluate = function.buffer()
-        self._memory: int | None = None
         self._loaded = False
         self._in = {
             name: np.zeros(function.sparsity_in(i).nnz()) for i, name in enumerate(function.name_in())
@@ -111,8 +101,12 @@ class ConicSolver(Solver):
         # CasADi tells a missing side by inf
         given["lba"][:], given["uba"][:] = problem.lower, problem.upper
         given["lbx"][:], given["ubx"][:] = problem.floor, problem.ceiling
-        self._evaluate()
-        stats = self._stats()
+        try:
+            self._evaluate()
+        except RuntimeError:  # some raise whatever they were told
+            stats: dict[str, Any] = {}
+        else:
+            stats = self._stats()
         status = _status_of(stats)
         iterations = max(int(stats.get("iter_count", 0)), 0)  # -1 where the solver does not count
         if status is not QpStatus.SOLVED:
@@ -132,17 +126,11 @@ class ConicSolver(Solver):
             self._in[start][:] = 0.0 if zero else self._out[end]
 
     def _stats(self) -> dict[str, Any]:
-        """Statistics of the buffer's own memory, which has a number that CasADi does not tell."""
-        if self._memory is not None:
+        """Statistics of the last solve; none where it broke off before there were any."""
+        try:
             return dict(self._function.stats(self._memory))
-        for memory in range(_MEMORIES):
-            try:
-                stats = dict(self._function.stats(memory))
-            except RuntimeError:
-                continue
-            self._memory = memory
-            return stats
-        return {}
+        except RuntimeError:
+            return {}
 
 
 def _status_of(stats: dict[str, Any]) -> QpStatus:

@@ -23,6 +23,7 @@ from bluefoot_mpc.types import FloatArray
 _OPTIMAL = 1
 _STATUS = {
     -1: QpStatus.INFEASIBLE,
+    -6: QpStatus.INFEASIBLE,  # equalities that contradict each other
     -4: QpStatus.MAX_ITERATIONS,
     -7: QpStatus.MAX_ITERATIONS,
 }
@@ -56,6 +57,8 @@ class DaqpSolver(Solver):
         flag, x, info = self._updated(problem) if warm else self._set_up(problem)
         if flag != _OPTIMAL and warm:
             flag, x, info = self._set_up(problem)
+        if flag != _OPTIMAL and self._equal.any():
+            flag, x, info = self._reduced(problem)
         iterations = info.get("iterations", 0)
         if flag != _OPTIMAL:
             self._forget()
@@ -95,6 +98,15 @@ class DaqpSolver(Solver):
                 problem.hessian, problem.gradient, problem.matrix, self._high, self._low, sense
             )
         return self._answer(model, flag)
+
+    def _reduced(self, problem: QpProblem) -> _Answer:
+        """Solve with equalities eliminated first: repeated ones may look infeasible otherwise."""
+        self._model = None
+        x, _, flag, info = daqp.solve(
+            problem.hessian, problem.gradient, problem.matrix, self._high, self._low,
+            self._mark(start=None), eq_reduction=1, **self._settings,
+        )  # fmt: skip
+        return flag, x, info
 
     def _answer(self, model: Any, flag: int) -> _Answer:
         if flag < 0:

@@ -85,7 +85,7 @@ class GeneralSolver(Solver):
             m(problem.hessian), problem.gradient,
             m(np.concatenate([a[above], -a[below]])),
             np.concatenate([self._upper[above], -self._lower[below]]),
-            m(a[equal]), self._lower[equal], self._floor, self._ceiling,
+            m(a[equal]), self._lower[equal], problem.floor, problem.ceiling,
         )  # fmt: skip
         try:
             with warnings.catch_warnings():
