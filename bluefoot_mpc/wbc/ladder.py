@@ -81,20 +81,29 @@ def nearest_point(problem: QpProblem) -> FloatArray | None:
             step = -np.linalg.solve(hessian + penalty * rows.T @ rows, slope)
         except np.linalg.LinAlgError:  # numbers too large to add up
             return None
-        descent, change, length = float(slope @ step), matrix @ step, 1.0
-        first, second = float((hessian @ x + gradient) @ step), float(step @ hessian @ step)
-        before = penalty * float(over @ over)
-        while length > _SHORTEST:
-            moved = value + length * change
-            moved -= np.clip(moved, lower, upper)
-            rise = length * first + 0.5 * length * length * second
-            if rise + 0.5 * (penalty * float(moved @ moved) - before) <= 1e-4 * length * descent:
-                break
-            length *= 0.5
-        x = x + length * step
-        if -descent <= _SETTLED * (1.0 + abs(first) + before):
+        x = x + _shortened(problem, x, step, penalty) * step
+        if -float(slope @ step) <= _SETTLED * (1.0 + abs(float(gradient @ x))):
             break
     return x if np.isfinite(x).all() else None
+
+
+def _shortened(problem: QpProblem, x: FloatArray, step: FloatArray, penalty: float) -> float:
+    """Share of a step after which cost and penalties have fallen."""
+    value, change = np.concatenate([problem.matrix @ x, x]), np.concatenate([problem.matrix @ step, step])
+    lower = np.concatenate([problem.lower, problem.floor])
+    upper = np.concatenate([problem.upper, problem.ceiling])
+    first = float((problem.hessian @ x + problem.gradient) @ step)
+    second = float(step @ problem.hessian @ step)
+
+    def rise(length: float) -> float:
+        moved = value + length * change
+        moved -= np.clip(moved, lower, upper)
+        return length * first + 0.5 * length * length * second + 0.5 * penalty * float(moved @ moved)
+
+    start, length = rise(0.0), 1.0
+    while rise(length) > start and length > _SHORTEST:
+        length *= 0.5
+    return length
 
 
 def into_limits(model: WholeBodyModel, problem: QpProblem, x: FloatArray, friction: float) -> FloatArray:

@@ -13,7 +13,7 @@ from typing import Any
 
 import casadi as ca
 
-from bluefoot_mpc.model.symbolic import SymbolicTree, TreeState
+from bluefoot_mpc.model.symbolic import FootTerms, SymbolicTree, TreeState
 from bluefoot_mpc.model.symbolic.algebra import quaternion_matrix
 from bluefoot_mpc.wbc.constraints.dynamics import ReducedDynamics, ground_axes
 from bluefoot_mpc.wbc.constraints.joints import acceleration_bounds
@@ -98,23 +98,17 @@ def plan_function(model: WholeBodyModel) -> ca.Function:
     them. Output: `plan_layout`.
     """
     vector, given = parameter_layout(model).symbols()
-    count, joints = len(model.feet), model.joints
-    x, base = ca.SX.sym("x", joints + 3 * count), ca.SX.sym("base", BASE)
-    bounds = ca.SX.sym("bounds", joints + 3 * count, 4)
+    joints, unknowns = model.joints, model.joints + 3 * len(model.feet)
+    x, base = ca.SX.sym("x", unknowns), ca.SX.sym("base", BASE)
+    bounds = ca.SX.sym("bounds", unknowns, 4)
     rotation = quaternion_matrix(given.q[3:7])
     com = SymbolicTree(model.pin_model, _state(model, given)).com
     linear = base[:3] + ca.cross(com, base[3:])  # at the base's origin
-    state = _state(model, given, (linear, base[3:], x[:joints]))
-    tree = SymbolicTree(model.pin_model, state)
+    tree = SymbolicTree(model.pin_model, _state(model, given, (linear, base[3:], x[:joints])))
     feet = [tree.foot(frame) for frame in model.frames]
     axes = force_unit(model) * ground_axes(given.ground)
-    pushes = [axes @ x[joints + 3 * i : joints + 3 * i + 3] for i in range(count)]
-    lacking = [tree.linear_bias, tree.angular_bias]
-    torque = tree.joint_bias + ca.DM(model.actuators.armature) * x[:joints]
-    for foot, push in zip(feet, pushes, strict=True):
-        lacking[0] = lacking[0] - push
-        lacking[1] = lacking[1] - ca.cross(foot.position - tree.com, push)
-        torque = torque - foot.jacobian.T @ push
+    pushes = [axes @ x[start : start + 3] for start in range(joints, unknowns, 3)]
+    torque, lacking = _balance(model, tree, feet, pushes, x[:joints])
     lowest, highest = torque_bounds(given.torque, given.strength, given.back_emf, given.v[BASE:])
     spare = ca.fmin(highest - torque, torque - lowest)
     outputs = {
@@ -126,11 +120,24 @@ def plan_function(model: WholeBodyModel) -> ca.Function:
         "spare": spare,
         "violation": ca.mmax(ca.vertcat(-spare / given.torque, _broken(x, bounds, joints, given))),
         # A norm, not a largest entry: it is NaN as soon as anything is.
-        "residual": ca.norm_2(ca.vertcat(*lacking)),
+        "residual": ca.norm_2(lacking),
     }
     flat = ca.vertcat(*[outputs[name] for name in plan_layout(model).slices])
     inputs = {"parameters": vector, "x": x, "base": base, "bounds": bounds}
     return _function("whole_body_plan", inputs, {"plan": flat})
+
+
+def _balance(
+    model: WholeBodyModel, tree: SymbolicTree, feet: list[FootTerms], pushes: list[Any], change: Any
+) -> tuple[Any, Any]:
+    """Joint torques of a motion under the ground's forces, and the six forces that the base then lacks."""
+    linear, angular = tree.linear_bias, tree.angular_bias
+    torque = tree.joint_bias + ca.DM(model.actuators.armature) * change
+    for foot, push in zip(feet, pushes, strict=True):
+        linear = linear - push
+        angular = angular - ca.cross(foot.position - tree.com, push)
+        torque = torque - foot.jacobian.T @ push
+    return torque, ca.vertcat(linear, angular)
 
 
 def _broken(x: Any, bounds: Any, joints: int, given: SimpleNamespace) -> Any:

@@ -1,5 +1,6 @@
 """Plans of the whole-body controller: forces, limits, tasks, dynamics, backends."""
 
+import copy
 import dataclasses
 import functools
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
-from bluefoot_mpc.qp import SolverOptions, make_solver, residuals
+from bluefoot_mpc.qp import QpProblem, SolverOptions, make_solver, residuals
 from bluefoot_mpc.types import Fallback
 from bluefoot_mpc.wbc import WholeBodyConfig, WholeBodyController, WholeBodyWeights
 from bluefoot_mpc.wbc.samples import Spread, sample_inputs, sample_problems
@@ -17,39 +18,31 @@ SOLVERS = ("daqp", "proxsuite")
 
 
 @functools.cache
-def shared(solver: str = "daqp") -> WholeBodyController:
-    return WholeBodyController(bluefoot(), WholeBodyConfig(solver=solver))
+def shared(name: str) -> WholeBodyController:
+    # The virtual machine for the other robots: these tests need no second build of C.
+    model = bluefoot() if name == "bluefoot" else other(name)
+    return WholeBodyController(model, WholeBodyConfig(codegen=name == "bluefoot"))
 
 
-def controller(solver: str = "daqp") -> WholeBodyController:
-    made = shared(solver)
+def controller(name: str = "bluefoot") -> WholeBodyController:
+    made = shared(name)
     made.reset()
     return made
 
 
 @functools.cache
-def shared_other(name: str, solver: str) -> WholeBodyController:
-    # The virtual machine: these tests need no second build of C.
-    return WholeBodyController(other(name), WholeBodyConfig(codegen=False, solver=solver))
-
-
-def other_controller(name: str, solver: str = "daqp") -> WholeBodyController:
-    made = shared_other(name, solver)
-    made.reset()
-    return made
+def some_problems() -> list[QpProblem]:
+    problems = sample_problems(bluefoot(), 4)
+    return [copy.deepcopy(next(problems)) for _ in range(30)]
 
 
 def robots() -> list[str]:
     return ["bluefoot", *OTHERS]
 
 
-def make(name: str) -> WholeBodyController:
-    return controller() if name == "bluefoot" else other_controller(name)
-
-
 @pytest.mark.parametrize("name", robots())
 def test_standing_forces_carry_the_weight(name: str) -> None:
-    made = make(name)
+    made = controller(name)
     plan = made.step(standing(made.model), DT)
     assert plan.status is Fallback.SOLVED
     assert plan.reason == ""
@@ -81,7 +74,7 @@ def test_any_set_of_feet_may_stand(contact: list[int]) -> None:
 
 @pytest.mark.parametrize("name", robots())
 def test_dynamics_hold_at_random_states(name: str) -> None:
-    made, rng = make(name), np.random.default_rng(11)
+    made, rng = controller(name), np.random.default_rng(11)
     for k in range(60 if name == "bluefoot" else 10):
         inputs = sample_inputs(made.model, rng, Spread().scaled(10.0 ** rng.uniform(-2.0, 0.3)))
         plan = made.step(inputs, DT)
@@ -94,7 +87,7 @@ def test_dynamics_hold_at_random_states(name: str) -> None:
 
 @pytest.mark.parametrize("name", robots())
 def test_limits_hold_at_random_states(name: str) -> None:
-    made, rng = make(name), np.random.default_rng(12)
+    made, rng = controller(name), np.random.default_rng(12)
     actuators, config = made.model.actuators, made.config
     weight = made.model.weight
     for _ in range(60 if name == "bluefoot" else 10):
@@ -221,7 +214,7 @@ def test_reset_gives_back_the_first_answer_bit_for_bit() -> None:
 @pytest.mark.parametrize("name", robots())
 def test_the_shortcut_is_the_optimum(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The optimum without limits is only taken where the solver's is the same."""
-    made, rng, taken = make(name), np.random.default_rng(13), 0
+    made, rng, taken = controller(name), np.random.default_rng(13), 0
     for _ in range(40 if name == "bluefoot" else 10):
         inputs = sample_inputs(made.model, rng, Spread().scaled(10.0 ** rng.uniform(-3.0, -0.5)))
         made.reset()
@@ -260,16 +253,21 @@ def test_virtual_machine_and_generated_code_agree() -> None:
 
 
 @pytest.mark.parametrize("name", robots())
-def test_backends_agree(name: str) -> None:
-    daqp = make(name)
-    prox = controller("proxsuite") if name == "bluefoot" else other_controller(name, "proxsuite")
-    rng = np.random.default_rng(10)
-    scale = max(1.0, daqp.model.weight / 20.0)
+def test_backends_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    made, rng = controller(name), np.random.default_rng(10)
+    monkeypatch.setattr(made, "config", dataclasses.replace(made.config, free_first=False))
+    sizes = [solver.size for solver in made._solvers]
+    solvers = {"daqp": made._solvers}
+    solvers["proxsuite"] = [make_solver("proxsuite", n, SolverOptions(warm_start=False)) for n in sizes]
+    scale = max(1.0, made.model.weight / 20.0)
     for _ in range(25 if name == "bluefoot" else 8):
-        inputs = sample_inputs(daqp.model, rng, Spread().scaled(10.0 ** rng.uniform(-2.0, 0.0)))
-        daqp.reset()
-        prox.reset()
-        a, b = daqp.step(inputs, DT), prox.step(inputs, DT)
+        inputs = sample_inputs(made.model, rng, Spread().scaled(10.0 ** rng.uniform(-2.0, 0.0)))
+        plans = []
+        for backend in SOLVERS:
+            monkeypatch.setattr(made, "_solvers", solvers[backend])
+            made.reset()
+            plans.append(made.step(inputs, DT))
+        a, b = plans
         assert a.status is b.status, (a.reason, b.reason)
         if a.status is Fallback.SOLVED:
             np.testing.assert_allclose(a.com_acceleration, b.com_acceleration, atol=1e-4)
@@ -278,13 +276,10 @@ def test_backends_agree(name: str) -> None:
 
 @pytest.mark.parametrize("name", SOLVERS)
 def test_answers_are_optimal(name: str) -> None:
-    problems, solvers = sample_problems(bluefoot(), 4, WholeBodyConfig(codegen=False)), {}
-    solved = 0
-    for _ in range(30):
-        problem = next(problems)
-        solver = solvers.setdefault(
-            problem.size, make_solver(name, problem.size, SolverOptions(warm_start=False))
-        )
+    solvers, solved = {}, 0
+    for problem in some_problems():
+        options = SolverOptions(warm_start=False)
+        solver = solvers.setdefault(problem.size, make_solver(name, problem.size, options))
         solution = solver.solve(problem)
         if solution.ok:
             solved += 1
