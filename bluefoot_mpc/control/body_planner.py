@@ -40,6 +40,7 @@ class BodyPlannerConfig:
     """The whole-body problem of the pipeline."""
 
     enabled: bool = False
+    swing_acceleration: float = 0.0  # share of the swinging feet's planned acceleration that torques make
     problem: WholeBodyConfig = field(default_factory=_feed_forward)
 
 
@@ -73,6 +74,7 @@ class BodyPlanner:
     def __init__(self, robot: RobotModel, config: BodyPlannerConfig) -> None:
         self._controller = WholeBodyController(WholeBodyModel.from_robot(robot), config.problem)
         self._no_com = np.zeros(3)
+        self._swing_share = config.swing_acceleration
 
     def reset(self) -> None:
         """Forget the last plan."""
@@ -97,7 +99,7 @@ class BodyPlanner:
         inputs = WholeBodyInputs(
             q=body.q, v=body.v, contact=~swing, com=self._no_com, trunk=body.q[3:7],
             com_acceleration=_com_acceleration(around.com), foot=gait.foot_position,
-            foot_acceleration=around.feet.acceleration, posture=body.q[7:],
+            foot_acceleration=self._swing_share * around.feet.acceleration, posture=body.q[7:],
             remaining=_remaining(gait), ground=_normal(around.slope),
             voltage=around.voltage, derating=around.derating,
         )  # fmt: skip

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
 
 from bluefoot_mpc.control.body_planner import BodyPlannerConfig
+from bluefoot_mpc.control.gait_sway import SwayConfig
 from bluefoot_mpc.control.ground import GroundAdaptationConfig
 from bluefoot_mpc.control.modes import ModeConfig
 from bluefoot_mpc.control.posture import PostureConfig
@@ -26,7 +26,7 @@ class ControlConfig:
     gait: GaitConfig = field(default_factory=GaitConfig)
     posture: PostureConfig = field(default_factory=PostureConfig)
     ankle: AnkleConfig = field(default_factory=lambda: AnkleConfig(policy="margin"))
-    sway: Literal["static", "preview"] = "static"  # the paper's placement law, or ZMP preview
+    sway: SwayConfig = field(default_factory=SwayConfig)
     zmp: PlacementConfig = field(default_factory=PlacementConfig)
     preview: PreviewConfig = field(default_factory=PreviewConfig)
     tracking: TrackingConfig = field(default_factory=TrackingConfig)

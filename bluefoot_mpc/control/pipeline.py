@@ -15,6 +15,7 @@ from bluefoot_mpc.control import modes, posture, servo_map, tracking
 from bluefoot_mpc.control.body_planner import BodyPlanner, Surroundings
 from bluefoot_mpc.control.command import usable
 from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.control.gait_sway import GaitSway
 from bluefoot_mpc.control.ground import GroundAdapter
 from bluefoot_mpc.control.leg_masses import LegMasses
 from bluefoot_mpc.control.planned_body import PlannedBody
@@ -128,11 +129,12 @@ class Pipeline:
         )  # fmt: skip
         return ControlOutput(command=command, telemetry=telemetry)
 
-    def _sway(self, joints_in_stance: JointsInStance) -> Sway | PreviewSway:
+    def _sway(self, joints_in_stance: JointsInStance) -> GaitSway:
         masses, config = LegMasses(self._robot.parameters), self.config
-        if config.sway == "preview":
-            return PreviewSway(masses, config.preview, joints_in_stance, self._gait.schedule)
-        return Sway(masses, config.zmp, joints_in_stance)
+        preview = None
+        if "preview" in (config.sway.trot, config.sway.walk):
+            preview = PreviewSway(masses, config.preview, joints_in_stance, self._gait.schedule)
+        return GaitSway(config.sway, Sway(masses, config.zmp, joints_in_stance), preview)
 
     def _rotation_base_to_virtual(self, estimate: BodyState) -> FloatArray:
         """(3, 3) rotation from the base frame to b': estimated tilt, commanded yaw of the trunk."""
@@ -192,7 +194,7 @@ class Pipeline:
 
     def _footing(self, estimate: BodyState) -> Footing:
         """How the robot stands; the preview plans with the joints as they are planned themselves."""
-        planned = self.config.sway == "preview" and self._targets.started
+        planned = self._trunk.plan is not None and self._targets.started
         return Footing(
             sit_level=self._modes.sit_level,
             joints=self._body.q[7:] if planned else estimate.joint_position,

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from bluefoot_mpc.control.body_planner import BodyPlannerConfig
 from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.control.gait_sway import SwayConfig
 from bluefoot_mpc.control.ground import GroundAdaptationConfig
 from bluefoot_mpc.control.servo_map import ServoMapConfig
 from bluefoot_mpc.exceptions import UnknownNameError
+from bluefoot_mpc.gait.config import GaitConfig
+from bluefoot_mpc.gait.table import GaitTable
+from bluefoot_mpc.zmp.preview.config import PreviewConfig, PreviewWeights
+from bluefoot_mpc.zmp.support import SupportConfig
 
 CONTROLLERS = ("cpg", "mpc")
 """``cpg``: the paper's laws. ``mpc``: preview and whole-body control beside them."""
@@ -24,8 +29,22 @@ def preset(name: str) -> ControlConfig:
         return ControlConfig()
     if name == "mpc":
         return ControlConfig(
+            sway=SwayConfig(trot="static", walk="preview"),
+            preview=_preview(),
+            gait=GaitConfig(walk_table=_walk_table()),
             ground=GroundAdaptationConfig(enabled=True),
             whole_body=BodyPlannerConfig(enabled=True),
             servo=ServoMapConfig(mixing=0.6, back_emf=1.0),
         )
     raise UnknownNameError("controller", name, CONTROLLERS)
+
+
+def _walk_table() -> GaitTable:
+    return GaitTable(speed=(0.03,), step_height=(0.014,), mixing=(0.9,), back_emf=(0.5,))
+
+
+def _preview() -> PreviewConfig:
+    return PreviewConfig(
+        reach=(0.05, 0.05), centre_pull=0.2, support=SupportConfig(margin=0.025),
+        weights=PreviewWeights(jerk=5e-6),
+    )  # fmt: skip

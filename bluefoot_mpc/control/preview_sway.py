@@ -48,10 +48,14 @@ class PreviewSway:
 
     def reset(self) -> None:
         """Forget the plan and the commanded pose."""
+        self.forget()
+        self.follow(np.zeros(6))
+
+    def forget(self) -> None:
+        """Forget the plan: the next one starts from rest at the neutral place."""
         self.offset = np.zeros(2)
         self.plan: ComPlan | None = None
         self._preview.reset()
-        self.follow(np.zeros(6))
 
     def follow(self, pose: FloatArray) -> None:
         """Take note of a change of the commanded pose, (6,) m and rad."""

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bluefoot_mpc.control import posture
+from bluefoot_mpc.control.gait_sway import GaitSway
 from bluefoot_mpc.control.posture import PostureConfig, Stance
-from bluefoot_mpc.control.preview_sway import PreviewSway
-from bluefoot_mpc.control.sway import Sway
 from bluefoot_mpc.gait.gait import GaitOutput
 from bluefoot_mpc.model.legs import IkResult
 from bluefoot_mpc.types import BodyState, BoolArray, FloatArray, MotionCommand, PostureReference
@@ -55,7 +54,7 @@ class TrunkPlanner:
         self,
         stance: Stance,
         config: PostureConfig,
-        sway: Callable[[JointsInStance], Sway | PreviewSway],
+        sway: Callable[[JointsInStance], GaitSway],
         reach: Callable[[PostureReference], IkResult],
     ) -> None:
         self._reach = reach
@@ -77,7 +76,7 @@ class TrunkPlanner:
     @property
     def plan(self) -> ComPlan | None:
         """The preview's plan of the last tick; None without a preview."""
-        return self._sway.plan if isinstance(self._sway, PreviewSway) else None
+        return self._sway.plan
 
     def step(
         self, gait: GaitOutput, motion: MotionCommand, estimate: BodyState, stand: Footing, dt: float

@@ -238,6 +238,7 @@ class Gait:
             foot_height=values[24:28],
             swing_progress=values[28:32],
             virtual_pose=values[32:35],
+            place=state.place,
             velocity=values[35:37],
             yaw_rate=state.yaw_rate,
             cycle_time=state.cycle,

@@ -62,6 +62,7 @@ class GaitOutput:
         cycle_time: s.
         swing_share: share of the cycle that a leg swings.
         style: what the gait's table says about the trunk, for later stages.
+        place: place between the gaits, 0 trot, 1 walk.
     """
 
     phase: GaitPhase
@@ -74,6 +75,7 @@ class GaitOutput:
     cycle_time: float
     swing_share: float
     style: Style = NO_STYLE
+    place: float = 0.0
 
 
 @dataclass(kw_only=True, slots=True)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from bluefoot_mpc.control import posture
+from bluefoot_mpc.control.gait_sway import GaitSway, SwayConfig
 from bluefoot_mpc.control.leg_masses import LegMasses
 from bluefoot_mpc.control.posture import PostureConfig
 from bluefoot_mpc.control.servo_map import ServoMapConfig
@@ -37,7 +38,10 @@ class Bench:
         self.targets = JointTargets(robot.geometry, AnkleConfig())
         masses = LegMasses(robot.parameters)
         self.trunk = TrunkPlanner(
-            stance, config, lambda joints: Sway(masses, zmp, joints), self.targets.reach
+            stance,
+            config,
+            lambda joints: GaitSway(SwayConfig(), Sway(masses, zmp, joints), None),
+            self.targets.reach,
         )
         self.gait = Gait(GaitConfig(), stance.feet, posture.style(stance, config, ServoMapConfig()))
         self.joints = robot.stance_joints
