@@ -22,7 +22,7 @@ from bluefoot_mpc.settings import require_finite, require_nonnegative, require_p
 from bluefoot_mpc.types import FloatArray
 
 _LOCKED = 0.06
-"""Share of a cycle: in a trot the legs of a diagonal are closer, and the diagonals as close to half a cycle."""
+"""Share of a cycle: in a trot the legs of a diagonal are closer, the diagonals as close to half a cycle."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
