@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bluefoot_mpc.control import modes, posture, servo_map, tracking
+from bluefoot_mpc.control import modes, plans, posture, servo_map, tracking
 from bluefoot_mpc.control.body_planner import BodyPlanner, Surroundings
 from bluefoot_mpc.control.command import usable
 from bluefoot_mpc.control.config import ControlConfig
@@ -92,6 +92,7 @@ class Pipeline:
         self._tracking = tracking.TrackingState()
         self._wanted = MotionCommand()
         self._notices: tuple[str, ...] = ()
+        self._own_request = SafetyRequest()
         self._walking = False
 
     def step(
@@ -109,7 +110,8 @@ class Pipeline:
         upright = self._rotation_base_to_virtual(estimate)
         self._wanted, faults = usable(motion, self._wanted)
         begun = self._begun(faults if estimate.healthy else (*faults, BLIND))
-        changed = self._advance_mode(safety or SafetyRequest(), float(upright[2, 2]))
+        urgent = plans.more_urgent(safety or SafetyRequest(), self._own_request)
+        changed = self._advance_mode(urgent, float(upright[2, 2]))
         motion = self._in_force(self._wanted, estimate)
         twist = self._corrected(motion, estimate, upright)
         gait = self._gait.step(self._gait_inputs(twist, motion, estimate, upright), dt)
@@ -120,12 +122,14 @@ class Pipeline:
         joints, cut = self._targets.step(reference, frame, dt, gait.style.ankle_shift)
         plan = self._planned(gait, reference, joints, frame)
         goals = self._goals(gait.style, joints, plan, frame)
+        planned = plans.report(self._trunk.plan, plan)
+        self._own_request = plans.step_back(planned)
         command = JointCommand(
             position=goals, speed=np.zeros(N_JOINTS), torque_limit=np.full(N_JOINTS, self._modes.torque)
         )
         telemetry = Telemetry(
             time=frame.time, mode=self._modes.mode, motion=motion, estimate=estimate, phase=gait.phase,
-            reference=reference, zmp=zmp, events=begun + held + cut + changed,
+            reference=reference, zmp=zmp, events=begun + held + cut + changed, plan=planned,
         )  # fmt: skip
         return ControlOutput(command=command, telemetry=telemetry)
 

@@ -1,0 +1,54 @@
+"""What the plans of a tick mean for telemetry, and for the robot when they come from down the ladder."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bluefoot_mpc.types import (
+    N_JOINTS,
+    N_LEGS,
+    Fallback,
+    PlanReport,
+    SafetyLevel,
+    SafetyRequest,
+)
+from bluefoot_mpc.wbc import WholeBodyPlan
+from bluefoot_mpc.zmp.preview import ComPlan
+
+
+def report(com: ComPlan | None, body: WholeBodyPlan | None) -> PlanReport | None:
+    """The account of a tick's plans; None where nothing was planned."""
+    if com is None and body is None:
+        return None
+    preview = Fallback.SOLVED if com is None else com.status
+    whole_body = Fallback.SOLVED if body is None else body.status
+    return PlanReport(
+        com=np.full((3, 2), np.nan) if com is None else com.start,
+        margin=float("nan") if com is None else com.least_margin,
+        foot_force=np.full((N_LEGS, 3), np.nan) if body is None else body.foot_force,
+        torque=np.full(N_JOINTS, np.nan) if body is None else body.torque,
+        preview=preview,
+        whole_body=whole_body,
+        qp_failures=int(preview > Fallback.SOLVED) + int(whole_body > Fallback.SOLVED),
+        residual=0.0 if body is None else body.residual,
+    )
+
+
+def step_back(plans: PlanReport | None) -> SafetyRequest:
+    """What the controller itself asks for on the next tick: to stand without a plan, then to sit."""
+    if plans is None:
+        return SafetyRequest()
+    rung = max(plans.preview, plans.whole_body)
+    stage = "preview" if plans.preview >= plans.whole_body else "whole-body problem"
+    if rung >= Fallback.SIT:
+        return SafetyRequest(level=SafetyLevel.SIT, reasons=(f"no plan from the {stage} for too long",))
+    if rung >= Fallback.STANCE:
+        return SafetyRequest(level=SafetyLevel.HOLD, reasons=(f"no plan from the {stage}",))
+    return SafetyRequest()
+
+
+def more_urgent(one: SafetyRequest, other: SafetyRequest) -> SafetyRequest:
+    """The request with the higher level; reasons of both where they agree on it."""
+    if one.level != other.level:
+        return one if one.level > other.level else other
+    return SafetyRequest(level=one.level, reasons=(*one.reasons, *other.reasons))
