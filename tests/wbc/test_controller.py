@@ -211,6 +211,19 @@ def test_reset_gives_back_the_first_answer_bit_for_bit() -> None:
             np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
 
 
+def test_a_foot_that_touches_down_takes_its_load_over_the_ramp() -> None:
+    """The ramp's memory lives in the controller, and reset makes every foot carry fully."""
+    made, down, cap = controller(), standing(bluefoot()), 2.0 * bluefoot().weight
+    made.step(standing(bluefoot(), [1, 1, 1, 0]), DT)
+    tick = made.config.force_ramp / 10.0
+    forces = [made.step(down, tick).foot_force[3, 2] for _ in range(10)]
+    assert forces[0] <= 0.1 * cap + 1e-6
+    assert forces[0] < forces[-1] - 0.5
+    made.step(standing(bluefoot(), [1, 1, 1, 0]), DT)
+    made.reset()
+    np.testing.assert_allclose(made.step(down, tick).foot_force[3, 2], forces[-1], atol=1e-6)
+
+
 @pytest.mark.parametrize("name", robots())
 def test_the_shortcut_is_the_optimum(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The optimum without limits is only taken where the solver's is the same."""
