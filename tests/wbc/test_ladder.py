@@ -145,7 +145,10 @@ def test_previous_plan_then_stance_then_sit(monkeypatch: pytest.MonkeyPatch) -> 
         sane(plan)
         assert "not finite" in plan.reason
         assert plan.residual == np.inf
+    made.reset()
+    assert made.step(blind, DT).status is Fallback.STANCE  # the time without a plan starts anew
     assert made.step(inputs, DT).status is Fallback.SOLVED
+    assert made.step(blind, DT).status is Fallback.SHIFTED
 
 
 @pytest.mark.parametrize(
