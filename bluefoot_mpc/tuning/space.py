@@ -20,12 +20,14 @@ class Parameter:
         keys: settings that take its value, e.g. ``control.posture.trunk_height``.
         low: smallest value, in the settings' unit.
         high: largest value.
+        step: distance of neighbouring values, counted from `low`; None varies freely.
     """
 
     name: str
     keys: tuple[str, ...]
     low: float
     high: float
+    step: float | None = None
 
     def __post_init__(self) -> None:
         """Check the range."""
@@ -37,7 +39,9 @@ class Parameter:
             )
 
     def clipped(self, value: float) -> float:
-        """The nearest value inside the range."""
+        """The nearest value inside the range, and on a step."""
+        if self.step is not None:
+            value = self.low + self.step * round((value - self.low) / self.step)
         return min(self.high, max(self.low, value))
 
 
@@ -88,8 +92,22 @@ class Space:
         return (*self.fixed, *varied)
 
 
-def _gait(gait: str, name: str, low: float, high: float, *keys: str) -> Parameter:
-    return Parameter(name=name, keys=tuple(f"control.gait.{gait}.{key}" for key in keys), low=low, high=high)
+TICK = 0.02
+"""s between commands.
+
+A cycle in which every leg's turn takes whole ticks looks the same each time.
+Others beat with the ticks: the trunk then tilts at a fraction of the gait's
+frequency, up to twice as much.
+"""
+
+
+def _cycle(gait: str, low: float, high: float, turns: int) -> Parameter:
+    keys = tuple(f"control.gait.{gait}.cycle_{bound}" for bound in ("min", "max"))
+    return Parameter(name="cycle_time", keys=keys, low=low, high=high, step=turns * TICK)
+
+
+def _gait(gait: str, name: str, low: float, high: float, key: str) -> Parameter:
+    return Parameter(name=name, keys=(f"control.gait.{gait}.{key}",), low=low, high=high)
 
 
 def _control(name: str, low: float, high: float, key: str) -> Parameter:
@@ -130,7 +148,7 @@ def trot_space(law: str = "virtual_force", *, feed_forward: bool = True) -> Spac
         UnknownNameError: there is no such law.
     """
     timing = (
-        _gait("trot", "cycle_time", 0.2, 0.55, "cycle_min", "cycle_max"),
+        _cycle("trot", 0.2, 0.52, 2),
         _gait("trot", "swing_share", 0.2, 0.5, "swing_share"),
         _gait("trot", "step_height", 0.010, 0.035, "height_min"),
     )
@@ -148,7 +166,7 @@ def walk_space(law: str = "virtual_force", *, feed_forward: bool = True) -> Spac
         UnknownNameError: there is no such law.
     """
     timing = (
-        _gait("walk", "cycle_time", 0.7, 2.0, "cycle_min", "cycle_max"),
+        _cycle("walk", 0.72, 2.0, 4),
         _gait("walk", "swing_share", 0.12, 0.25, "swing_share"),
         _gait("walk", "step_height", 0.012, 0.03, "height_min"),
         _control("zmp_lead", 0.05, 0.4, "zmp.lead"),

@@ -165,7 +165,7 @@ def _trial(
     trial: optuna.Trial, config: StudyConfig, space: Space, cases: Sequence[TuningCase], evaluate: Measure
 ) -> float:
     """Cost of one point over all seeds, given up at a rung where it falls behind."""
-    values = {p.name: trial.suggest_float(p.name, p.low, p.high) for p in space.parameters}
+    values = {p.name: trial.suggest_float(p.name, p.low, p.high, step=p.step) for p in space.parameters}
     overrides = space.overrides(values)
     seen: dict[str, dict[int, Figures]] = {case.name: {} for case in cases}
     total, done = float("inf"), 0

@@ -26,6 +26,12 @@ def test_values_are_cut_to_their_ranges():
     assert SPACE.checked({"height": 0.5, "cycle": 0.0}) == {"height": 0.13, "cycle": 0.2}
 
 
+def test_steps_count_from_the_lowest_value():
+    cycle = Parameter(name="cycle", keys=("a.b",), low=0.2, high=0.52, step=0.04)
+    assert cycle.clipped(0.33) == pytest.approx(0.32)
+    assert cycle.clipped(0.9) == 0.52
+
+
 def test_unknown_and_missing_values_are_named():
     with pytest.raises(UnknownNameError, match="hieght"):
         SPACE.checked({"hieght": 0.1, "cycle": 0.3})
