@@ -9,13 +9,14 @@ STAMP := $(VENV)/.installed
 IS_NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
 PYTHON ?= $(shell for name in python3 python3.13 python3.12 python3.11; do \
 	$$name -c '$(IS_NEW_ENOUGH)' 2>/dev/null && { echo $$name; break; }; done)
+PEERS := .venv-peers
 ARGS ?=
 
 # The matrices are small: threads of the linear algebra cost more than they bring.
 export OMP_NUM_THREADS ?= 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup walk test lint figures lock clean
+.PHONY: help setup walk test lint figures peers lock clean
 
 help: ## this list
 	@echo "make walk    install what is needed and walk the simulated robot"
@@ -23,6 +24,7 @@ help: ## this list
 	@echo "make setup   only install, into $(VENV)"
 	@echo "make lint    style, types, layers, generated files"
 	@echo "make figures measure every figure of the README (long; resumes where it stopped)"
+	@echo "make peers   time our stages beside other projects' (installs them into $(PEERS))"
 	@echo "make lock    pin the dependencies anew (needs uv)"
 	@echo "make clean   remove $(VENV), caches and builds (runs/ stays)"
 	@echo
@@ -63,11 +65,21 @@ lint: $(STAMP) ## style, types, layers, generated files
 figures: $(STAMP) ## every figure of the README
 	@$(BIN)/python benchmarks/figures.py $(ARGS)
 
+peers: $(PEERS)/.installed ## our stages beside other projects'
+	@PYTHONPATH=. $(PEERS)/bin/python benchmarks/peers/run.py $(ARGS)
+
+# TSID and PlaCo need another Pinocchio than ours: an environment of their own.
+$(PEERS)/.installed: benchmarks/peers/requirements.txt
+	@$(PEERS)/bin/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(PEERS)
+	@echo "Installing the peers into $(PEERS) (some minutes) ..."
+	@$(PEERS)/bin/python -m pip install --quiet --only-binary :all: -r $<
+	@touch $@
+
 lock: ## pin the dependencies anew
 	@uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 \
 		--generate-hashes --no-emit-index-url --no-emit-find-links --no-annotate \
 		--custom-compile-command "make lock" --upgrade --quiet -o requirements.lock
 
 clean: ## remove what was installed and built
-	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(PEERS) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
