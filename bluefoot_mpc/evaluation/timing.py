@@ -24,17 +24,25 @@ from bluefoot_mpc.scenarios.runner import supervise
 from bluefoot_mpc.sim.robot import SimRobot
 from bluefoot_mpc.types import SensorFrame
 
+_WHOLE_BODY = "_planner._controller._assembly"
 STAGES: tuple[tuple[str, str, str], ...] = (
     ("_estimator", "step", "estimation"),
     ("_gait", "step", "gait"),
-    ("_gait", "schedule", "contact schedule"),
+    ("_trunk._sway._preview", "_schedule", "contact schedule"),
+    ("_trunk._sway._preview._preview", "step", "ZMP preview"),
+    ("_trunk._sway", "step", "sway"),
     ("_trunk", "step", "trunk reference"),
-    ("_trunk.sway", "step", "sway"),
-    ("_trunk.sway._preview", "step", "ZMP preview"),
     ("_targets", "step", "inverse kinematics"),
-    ("", "_fed_forward", "servo mapping"),
+    ("_body", "step", "planned body"),
+    (_WHOLE_BODY, "fill", "whole body: assembly"),
+    (_WHOLE_BODY, "assemble", "whole body: assembly"),
+    (_WHOLE_BODY, "free_optimum", "whole body: solve"),
+    (_WHOLE_BODY, "evaluate", "whole body: evaluation"),
+    ("_planner", "step", "whole body: rest"),
+    ("", "_goals", "servo mapping"),
 )
 """Object of the pipeline, method, layer; what a configuration does not have is left out."""
+_SOLVERS = "_planner._controller._solvers"
 WARM_UP = 2.5
 """s at the start of a run that are left out: standing, and the first steps."""
 ROUNDS = 2
@@ -166,12 +174,19 @@ def watch_pipeline(watch: Stopwatch, pipeline: Pipeline) -> None:
     """Time every stage of a pipeline, and what is left of its tick."""
     _watch(watch, pipeline, "step", REST)
     for path, method, name in STAGES:
-        try:
-            owner = operator.attrgetter(path)(pipeline) if path else pipeline
-        except AttributeError:
-            continue
-        if hasattr(owner, method):
+        owner = part(pipeline, path)
+        if owner is not None and hasattr(owner, method):
             _watch(watch, owner, method, name)
+    for solver in part(pipeline, _SOLVERS) or ():
+        _watch(watch, solver, "solve", "whole body: solve")
+
+
+def part(pipeline: Pipeline, path: str) -> Any:
+    """A part of a pipeline by its dotted path ("" is the pipeline itself); None where there is none."""
+    try:
+        return operator.attrgetter(path)(pipeline) if path else pipeline
+    except AttributeError:
+        return None
 
 
 def _watch(watch: Stopwatch, owner: object, method: str, name: str) -> None:

@@ -6,8 +6,12 @@ from dataclasses import dataclass
 
 from bluefoot_mpc.exceptions import UnknownNameError
 
-NO_PREVIEW = "control.sway=static"
-NO_FEED_FORWARD = "control.servo.mixing=0"
+NO_PREVIEW = ("control.sway.trot=static", "control.sway.walk=static")
+NO_WHOLE_BODY = ("control.whole_body.enabled=false",)
+NO_TORQUE = (
+    "control.servo.mixing=0", "control.gait.trot_table.mixing=[]", "control.gait.walk_table.mixing=[]",
+)  # fmt: skip
+"""What switches a part off, wherever its share is stated: the tables of the gaits have the last word."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -30,13 +34,15 @@ class Variant:
 VARIANTS = (
     Variant(name="cpg", controller="cpg", meaning="the paper's laws"),
     Variant(
-        name="timing", controller="mpc", overrides=(NO_PREVIEW, NO_FEED_FORWARD),
-        meaning="gait, estimator and levelling of mpc; no model plans anything",
+        name="timing", controller="mpc", overrides=(*NO_PREVIEW, *NO_WHOLE_BODY),
+        meaning="gait tables, estimator and levelling of mpc, and the paper's sway",
     ),
+    Variant(name="preview", controller="mpc", overrides=NO_WHOLE_BODY, meaning="timing and the ZMP preview"),
     Variant(
-        name="preview", controller="mpc", overrides=(NO_FEED_FORWARD,), meaning="and the ZMP preview",
+        name="wbc", controller="mpc", overrides=NO_TORQUE,
+        meaning="preview and the whole-body problem: speed fed forward, no torque",
     ),
-    Variant(name="mpc", controller="mpc", meaning="and the planned torques fed forward: all of mpc"),
+    Variant(name="mpc", controller="mpc", meaning="wbc and torque fed forward: all of mpc"),
 )  # fmt: skip
 """From the paper's laws to all of model-based control; the first is what the others are compared with."""
 

@@ -2,8 +2,21 @@ import time
 
 import pytest
 
-from bluefoot_mpc.evaluation.timing import PHYSICS, TICK, WHOLE, Stopwatch, time_layers
+from bluefoot_mpc import load_robot
+from bluefoot_mpc.control.pipeline import Pipeline
+from bluefoot_mpc.evaluation.timing import (
+    PHYSICS,
+    STAGES,
+    TICK,
+    WHOLE,
+    Stopwatch,
+    part,
+    time_layers,
+    watch_pipeline,
+)
 from bluefoot_mpc.scenarios import RunOptions
+from bluefoot_mpc.scenarios.config import resolve
+from bluefoot_mpc.scenarios.registry import find_scenario
 
 
 def spend(seconds):
@@ -59,3 +72,13 @@ def test_layers_of_a_real_run_make_up_the_tick(controller):
     assert 0.0 < found[TICK].p50 < found[WHOLE].p50
     layers = sum(times.p50 for name, times in found.items() if name not in (TICK, WHOLE))
     assert layers > 0.5 * found[TICK].p50
+
+
+def test_every_layer_is_a_method_of_a_part_of_the_full_controller():
+    options = RunOptions(controller="mpc", overrides=("control.sway.walk=preview",))
+    control = resolve(find_scenario("walk"), options).stages.control
+    pipeline = Pipeline(load_robot(), control, 0.02)
+    for path, method, _ in STAGES:
+        assert callable(getattr(part(pipeline, path), method)), (path, method)
+    watch_pipeline(Stopwatch(), pipeline)
+    pipeline.reset()
