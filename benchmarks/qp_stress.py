@@ -1,11 +1,12 @@
 """Solve very many quadratic programs by several solvers, and keep what went wrong.
 
-    python benchmarks/qp_stress.py bluefoot_mpc.wbc.samples:problems --count 1000000
+    python benchmarks/qp_stress.py whole-body --count 1000000 --cold [--starts configurations.npy]
     python benchmarks/qp_stress.py body --count 20000 --solvers daqp,proxsuite,quadprog,casadi-daqp
     python benchmarks/qp_stress.py preview --count 20000 --fixed-matrices
 
 A family of problems is a callable ``problems(seed) -> iterator of QpProblem``, named as
-``module:callable``; ``body`` and ``preview`` are random ones built in. A seed is one block:
+``module:callable``. Built in are the whole-body problems of random states (near those given by
+``--starts``), and ``body`` and ``preview``, random ones of such sizes. A seed is one block:
 solvers are reset at its start and see its problems in their order, so a block can be solved
 again alone. Blocks done are kept in the result file and skipped by the next call of the same
 kind; more can be added by a larger ``--count``. Within a block a family for
@@ -20,17 +21,18 @@ solver raised, if a status was none of the known ones, or if an answer called so
 from __future__ import annotations
 
 import argparse
+import functools
 import importlib
 import itertools
 import json
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
+from qp_families import FAMILIES, Problems
 
 from bluefoot_mpc.qp import (
     QpProblem,
@@ -42,8 +44,6 @@ from bluefoot_mpc.qp import (
     make_solver,
     residuals,
 )
-
-Problems = Callable[[int], Iterator[QpProblem]]
 
 ARRAYS = ("hessian", "gradient", "matrix", "lower", "upper", "floor", "ceiling")
 WRITE_PERIOD = 20.0
@@ -163,55 +163,6 @@ def read_problem(path: Path) -> tuple[QpProblem, str]:
         return problem, str(file["why"])
 
 
-def body(seed: int) -> Iterator[QpProblem]:
-    """As large as a whole-body problem; all matrices drift, feet come and go by the sides of their rows."""
-    rng = np.random.default_rng(seed)
-    n, m, equalities = 28, 32, 6
-    root, matrix = rng.normal(size=(n + 4, n)), rng.normal(size=(m, n))
-    inside, gradient = rng.normal(size=n) * 0.3, rng.normal(size=n) * 5.0
-    p = QpProblem.empty(QpSize(variables=n, rows=m))
-    p.floor[:], p.ceiling[:] = -3.0, 3.0
-    for step in itertools.count():
-        root += rng.normal(size=root.shape) * 0.02
-        matrix += rng.normal(size=matrix.shape) * 0.02
-        gradient += rng.normal(size=n) * 0.1
-        inside = 0.99 * inside + rng.normal(size=n) * 0.02
-        p.hessian[:], p.gradient[:], p.matrix[:] = root.T @ root + 1e-3 * np.eye(n), gradient, matrix
-        value = p.matrix @ inside
-        p.lower[:], p.upper[:] = value - 1.0, value + 1.0
-        p.upper[equalities : m // 2] = np.inf
-        still = equalities + 4 * (step // 50 % 3)
-        p.lower[:still] = p.upper[:still] = value[:still]
-        yield p
-
-
-def preview(seed: int) -> Iterator[QpProblem]:
-    """As large as a preview of 32 samples on two axes: bands about diagonals that change in turn."""
-    rng = np.random.default_rng(seed)
-    samples, period, height = 32, 0.05, 0.13 / 9.81
-    lag = np.subtract.outer(np.arange(samples), np.arange(samples))
-    response = np.where(lag >= 0, (1 + 3 * lag + 3 * lag**2) * period**3 / 6 - height * period, 0.0)
-    times = period * np.arange(1, samples + 1)
-    free = np.stack([np.ones(samples), times, times**2 / 2 - height], axis=1)
-    p = QpProblem.empty(QpSize(variables=2 * samples, rows=2 * samples))
-    p.hessian[:] = np.kron(np.eye(2), response.T @ response + 1e-5 * np.eye(samples))
-    p.matrix[:] = np.kron(np.array([[1.0, 1.0], [1.0, -1.0]]), response)
-    p.floor[:], p.ceiling[:] = -200.0, 200.0
-    state = np.zeros((3, 2))
-    for step in itertools.count():
-        state = 0.9 * state + rng.normal(size=(3, 2)) * np.array([[0.003], [0.02], [0.1]])
-        side = np.where((np.arange(samples) + step // 3) // 6 % 2 == 0, 1.0, -1.0)
-        value = free @ state
-        p.gradient[:] = np.concatenate([response.T @ value[:, 0], response.T @ (value[:, 1] - 0.01 * side)])
-        width = np.concatenate([np.where(side > 0, 0.02, 0.15), np.where(side < 0, 0.02, 0.15)])
-        drift = np.concatenate([value.sum(axis=1), value[:, 0] - value[:, 1]])
-        p.lower[:], p.upper[:] = -width - drift, width - drift
-        yield p
-
-
-FAMILIES: dict[str, Problems] = {"body": body, "preview": preview}
-
-
 def find_family(name: str) -> Problems:
     if name in FAMILIES:
         return FAMILIES[name]
@@ -256,6 +207,7 @@ def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--count", type=int, default=10_000, help="problems in all")
     parser.add_argument("--block", type=int, default=500, help="problems per seed")
     parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--starts", type=Path, default=None, help="npy file, (m, nq) configurations")
     parser.add_argument(
         "--solvers", default="daqp,proxsuite", help="the first is what others are compared with"
     )
@@ -279,13 +231,18 @@ def main(arguments: list[str] | None = None) -> int:
         fixed_matrices=args.fixed_matrices, warm_start=not args.cold,
     )  # fmt: skip
     setup = Setup(
-        family=args.family, solvers=args.solvers.split(","), block=args.block, options=asdict(options)
+        family=f"{args.family} {args.starts or ''}".strip(),
+        solvers=args.solvers.split(","),
+        block=args.block,
+        options=asdict(options),
     )
     out = args.out or Path("runs") / f"qp_stress_{args.family.rpartition(':')[0] or args.family}.json"
     out.parent.mkdir(parents=True, exist_ok=True)
     blocks = read_blocks(out, setup)
     bench = Bench(setup, options, (args.kkt_limit, args.difference_limit), out.with_suffix(""), args.keep)
     problems = find_family(args.family)
+    if args.starts is not None:
+        problems = functools.partial(problems, starts=np.load(args.starts))
     seeds = range(args.first_seed, args.first_seed + -(-args.count // args.block))
     start = written = time.monotonic()
     fresh = 0
