@@ -116,6 +116,7 @@ class Pipeline:
         twist = self._corrected(motion, estimate, upright)
         gait = self._gait.step(self._gait_inputs(twist, motion, estimate, upright), dt)
         self._walking = gait.phase.walking
+        self._tracking = tracking.followed(self._tracking, twist, gait.velocity)
         gait = self._on_the_ground(gait, estimate, upright, dt)
         footing = self._footing(estimate)
         reference, zmp, held = self._trunk.step(gait, motion, estimate, footing, dt)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bluefoot_mpc.control.level import CentringConfig
 from bluefoot_mpc.control.servo_map import ServoMapConfig
 from bluefoot_mpc.gait.parameters import Style
 from bluefoot_mpc.model.parameters import StanceParameters
@@ -31,6 +32,7 @@ class PostureConfig:
     max_tilt: float = 0.7  # rad, each axis of a commanded rotation
     level_gain: float = 0.15  # 1/s, slow integral that trims the trunk's mean tilt away
     level_bound: float = 0.15  # rad, largest trim
+    centring: CentringConfig = field(default_factory=CentringConfig)
 
     def __post_init__(self) -> None:
         for name in ("trunk_height", "stance_x", "stance_y"):

@@ -6,7 +6,10 @@ from bluefoot_mpc.control.body_planner import BodyPlannerConfig
 from bluefoot_mpc.control.config import ControlConfig
 from bluefoot_mpc.control.gait_sway import SwayConfig
 from bluefoot_mpc.control.ground import GroundAdaptationConfig
+from bluefoot_mpc.control.level import CentringConfig
+from bluefoot_mpc.control.posture import PostureConfig
 from bluefoot_mpc.control.servo_map import ServoMapConfig
+from bluefoot_mpc.control.tracking import TrackingConfig
 from bluefoot_mpc.exceptions import UnknownNameError
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.table import GaitTable
@@ -32,6 +35,8 @@ def preset(name: str) -> ControlConfig:
             sway=SwayConfig(trot="static", walk="preview"),
             preview=_preview(),
             gait=GaitConfig(walk_table=_walk_table()),
+            posture=PostureConfig(centring=CentringConfig(enabled=True)),
+            tracking=TrackingConfig(velocity_bound=0.08),
             ground=GroundAdaptationConfig(enabled=True),
             whole_body=BodyPlannerConfig(enabled=True),
             servo=ServoMapConfig(mixing=0.6, back_emf=1.0),

@@ -9,13 +9,16 @@ wrong estimate can never run away with the gait.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from bluefoot_mpc.geometry import wrap_angle
 from bluefoot_mpc.settings import require_nonnegative
 from bluefoot_mpc.types import FloatArray
+
+_REACHED = 1e-3
+"""m/s, within which the gait goes at the speed that it was told."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -44,11 +47,14 @@ class TrackingState:
         velocity: (2,) m/s, integral correction in the heading frame.
         heading: rad, commanded heading in the odometry frame; NaN before the first walk.
         yaw_rate: rad/s, integral part of the heading correction.
+        on_its_way: True while the gait has not reached the speed that it was
+            told: what it lacks then is no error, and is not integrated.
     """
 
     velocity: FloatArray = field(default_factory=lambda: np.zeros(2))
     heading: float = float("nan")
     yaw_rate: float = 0.0
+    on_its_way: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -74,16 +80,29 @@ def advance(
     """
     heading = yaw if math.isnan(state.heading) else wrap_angle(state.heading + wanted.yaw_rate * dt)
     error = wrap_angle(heading - yaw)
-    gain, bound = config.velocity_gain * dt, config.velocity_bound
+    gain, bound = 0.0 if state.on_its_way else config.velocity_gain * dt, config.velocity_bound
     axes = zip(state.velocity.tolist(), wanted.velocity.tolist(), measured.tolist(), strict=True)
     velocity = np.array([min(max(slow + gain * (goal - seen), -bound), bound) for slow, goal, seen in axes])
     limit = config.heading_bound
     slow = min(limit, max(-limit, state.yaw_rate + config.yaw_integral_gain * error * dt))
     turn = min(limit, max(-limit, config.heading_gain * error + slow))
     corrected = Twist(velocity=wanted.velocity + velocity, yaw_rate=wanted.yaw_rate + turn)
-    return TrackingState(velocity=velocity, heading=heading, yaw_rate=slow), corrected
+    return replace(state, velocity=velocity, heading=heading, yaw_rate=slow), corrected
+
+
+def followed(state: TrackingState, told: Twist, gait_velocity: FloatArray) -> TrackingState:
+    """The memory, knowing how far the gait has come on its ramp.
+
+    Args:
+        state: memory of the corrections.
+        told: twist that the gait was given.
+        gait_velocity: (2,) m/s, the gait's velocity after its ramp.
+    """
+    lacking = float(np.abs(told.velocity - gait_velocity).max())
+    on_its_way = lacking > _REACHED
+    return state if on_its_way == state.on_its_way else replace(state, on_its_way=on_its_way)
 
 
 def rest(state: TrackingState) -> TrackingState:
     """Memory while the robot stands: the heading is forgotten, the speed correction kept."""
-    return TrackingState(velocity=state.velocity, heading=float("nan"), yaw_rate=state.yaw_rate)
+    return replace(state, heading=float("nan"))

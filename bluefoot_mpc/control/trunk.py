@@ -10,6 +10,7 @@ import numpy as np
 
 from bluefoot_mpc.control import posture
 from bluefoot_mpc.control.gait_sway import GaitSway
+from bluefoot_mpc.control.level import Centring
 from bluefoot_mpc.control.posture import PostureConfig, Stance
 from bluefoot_mpc.gait.gait import GaitOutput
 from bluefoot_mpc.model.legs import IkResult
@@ -17,6 +18,8 @@ from bluefoot_mpc.types import BodyState, BoolArray, FloatArray, MotionCommand, 
 from bluefoot_mpc.zmp.preview import ComPlan
 
 JointsInStance = Callable[[FloatArray], FloatArray]
+_TELLING = 2e-4
+"""m, shift of the load's centre from which the sway has to know."""
 _PLANTED: BoolArray = np.zeros(4, dtype=np.bool_)
 
 
@@ -61,12 +64,15 @@ class TrunkPlanner:
         self._stance = stance
         self._config = config
         self._sway = sway(self._joints_in_stance)
+        self._centring = Centring(config.centring)
         self.reset()
 
     def reset(self) -> None:
         """Forget every offset."""
         self._pose = np.zeros(6)
         self._trim = np.zeros(2)
+        self._centring.reset()
+        self._told = np.zeros(6)
         self._sway.reset()
         self._held = False
         self.position = self.over_stance(self._pose).trunk_position
@@ -97,17 +103,26 @@ class TrunkPlanner:
         # A blind estimate goes on from its last attitude: integrating it would tilt the trunk for real.
         if stand.sit_level == 0.0 and stand.settled and estimate.healthy:
             tilt = estimate.rpy[:2] - self._pose[3:5]
+            self._centring.step(tilt, gait, dt)
             self._trim = posture.trim_level(self._trim, tilt, style.level_gain, config.level_bound, dt)
         zmp = self._sway.step(gait, stand.joints, self.position, dt)
         height = style.trunk_height * (1.0 - stand.sit_level * (1.0 - config.sit_height_share))
         before = self._pose
         events = self._follow(gait, motion, height, dt)
-        if self._pose is not before:
-            self._sway.follow(self._pose)
+        self._tell_sway(moved=self._pose is not before)
         self.tilt_rate = _tilt_rate(before, self._pose, dt)
         reference = self._reference(gait, self._pose, height)
         self.position, self.yaw = reference.trunk_position, float(self._pose[5])
         return reference, zmp, events
+
+    def _tell_sway(self, moved: bool) -> None:
+        """Let the sway know where the trunk is told to be, or it would lead the trunk back."""
+        told = self._pose.copy()
+        told[:2] += self._centring.offset
+        # Small shifts wait until they add up: the sway solves the legs anew for each.
+        if moved or float(np.abs(told - self._told).max()) > _TELLING:
+            self._sway.follow(told)
+            self._told = told
 
     def over_stance(self, pose: FloatArray) -> PostureReference:
         """The reference of a (6,) commanded offset over the nominal stance."""
@@ -143,7 +158,7 @@ class TrunkPlanner:
 
     def _reference(self, gait: GaitOutput, pose: FloatArray, height: float) -> PostureReference:
         x, y, z, roll, pitch, yaw = pose.tolist()
-        shift_x, shift_y = self._sway.offset.tolist()
+        shift_x, shift_y = (self._sway.offset + self._centring.offset).tolist()
         trim_roll, trim_pitch = self._trim.tolist()
         return PostureReference(
             trunk_position=np.array([x + gait.style.trunk_forward + shift_x, y + shift_y, z + height]),
