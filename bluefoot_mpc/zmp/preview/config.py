@@ -53,12 +53,7 @@ class PreviewConfig:
     depth: float = 0.008  # m inside its region, where the ZMP is wanted
     centre_pull: float = 0.0  # share of the way from there to the middle of the feet, 0 to 1
     reach: tuple[float, float] = (0.03, 0.03)  # m, forward and sideways from the nominal place
-    rows: tuple[int, ...] = (
-        12,
-        24,
-        48,
-        96,
-    )  # constraints that a small problem holds, the larger ones on demand
+    rows: tuple[int, ...] = (12, 24, 48)  # of the small problems; the next is for what does not fit
     rounds: int = 8  # problems of one size per plan, before a larger one is posed
     tolerance: float = 1e-7  # m, violation that is none
     nearest_violation: float = 0.006  # m out of a region at which an approximate plan is still used

@@ -32,6 +32,7 @@ from bluefoot_mpc.zmp.preview.problem import PreviewProblem
 _UNIT = 1e-3
 """m, length that is one in the problem: solvers have absolute tolerances."""
 _GRADIENT_STEPS = 200
+_GRADIENT_ROWS = 64
 
 Indices = NDArray[np.intp]
 _NOTHING: Indices = np.zeros(0, dtype=np.intp)
@@ -61,9 +62,9 @@ class ProgramResult:
 
 
 def sizes(config: PreviewConfig) -> tuple[QpSize, ...]:
-    """Sizes of the problems, the last one with all rows."""
-    whole = 8 * config.samples + 4
-    counts = [*(count for count in config.rows if count < whole), whole]
+    """Sizes of the problems; a plan meets fewer rows than the last one holds."""
+    most = 4 * config.samples
+    counts = [*(count for count in config.rows if count < most), most]
     return tuple(QpSize(variables=count, rows=count) for count in counts)
 
 
@@ -85,11 +86,8 @@ class PreviewProgram:
         weights = config.weights
         prices = np.repeat([weights.support_slack, weights.reach_slack, weights.capture_slack], [n, n, 1])
         self._softness = np.repeat(1.0 / prices, 4)
-        counts = [size.rows for size in sizes(config)]
-        # The whole problem costs so much that the one before it is given all its rounds.
-        rooms = [*counts[:-2], counts[-1], counts[-1]][-len(counts) :]
         self._stages = tuple(
-            _Stage(solver, count, room) for solver, count, room in zip(solvers, counts, rooms, strict=True)
+            _Stage(solver, size.rows) for solver, size in zip(solvers, sizes(config), strict=True)
         )
 
     def reset(self) -> None:
@@ -101,7 +99,7 @@ class PreviewProgram:
         """Turn the problem's path from the unconstrained optimum, evaluated before, into the optimum."""
         self._take_levers(problem.levers)
         optimum, free = problem.path.copy(), problem.residuals.copy()
-        iterations, met = 0, _NOTHING
+        iterations, met, refused = 0, _NOTHING, 0
         for stage in self._stages:
             for _ in range(self._config.rounds):
                 chosen = stage.choose(problem.residuals, met)
@@ -110,6 +108,7 @@ class PreviewProgram:
                 count, multiplier = stage.solve(gram, free[chosen])
                 iterations += count
                 if multiplier is None:
+                    refused += 1
                     break
                 self._move(problem, optimum, responses, multiplier[:, None] * normals)
                 outside = problem.residuals < -self._config.tolerance
@@ -117,8 +116,10 @@ class PreviewProgram:
                 if not outside.any():
                     return ProgramResult(solved=True, iterations=iterations)
                 met = chosen[multiplier > 0.0]
-                if len(met) + np.count_nonzero(outside) > stage.room:
-                    break
+                if len(met) + np.count_nonzero(outside) > stage.count:
+                    break  # the next stage holds more
+            if refused > 1:
+                break
         problem.path[:] = optimum
         problem.evaluate()
         return ProgramResult(solved=False, iterations=iterations)
@@ -131,7 +132,7 @@ class PreviewProgram:
         """
         self._take_levers(problem.levers)
         optimum, free = problem.path.copy(), problem.residuals
-        chosen = np.argsort(free)[: 2 * self._config.rows[-1]]
+        chosen = np.argsort(free)[:_GRADIENT_ROWS]
         normals, responses = self._take_rows(problem, chosen)
         gram = self._gram(normals, responses, chosen)
         scale = gram.diagonal() ** -0.5
@@ -181,29 +182,21 @@ class PreviewProgram:
 class _Stage:
     """One solver and its problem.
 
-    Attributes:
-        solver: the backend.
-        room: rows, met or broken, beyond which the next stage takes over.
-
     Args:
         solver: the backend.
         count: rows of a problem.
-        room: see above.
     """
 
-    def __init__(self, solver: Solver, count: int, room: int) -> None:
-        self.solver, self._count, self.room = solver, count, room
+    def __init__(self, solver: Solver, count: int) -> None:
+        self.solver, self.count = solver, count
         self._problem = QpProblem.empty(QpSize(variables=count, rows=count))
 
     def choose(self, residuals: FloatArray, met: Indices) -> Indices:
         """The rows that were met and those with the smallest residuals."""
-        count = self._count
-        if count == len(residuals):
-            return np.arange(count)
         if len(met) > 0:
             residuals = residuals.copy()
             residuals[met] = -np.inf
-        return residuals.argpartition(count)[:count]
+        return residuals.argpartition(self.count)[: self.count]
 
     def solve(self, gram: FloatArray, free: FloatArray) -> tuple[int, FloatArray | None]:
         """Iterations, and the (k,) multipliers of the rows in 1/m; None without an answer."""
