@@ -19,6 +19,7 @@ class SolverOptions:
             size where that is above 1) of an answer that is still called solved.
         fixed_matrices: H and A of the first problem hold until `reset`: they are read,
             checked and factored once, and only vectors are read after.
+        verify: compare each answer with rows and bounds (3 µs); False for who does that anyway.
         warm_start: begin at the previous answer; False makes every answer
             depend on its own problem alone.
     """
@@ -27,6 +28,7 @@ class SolverOptions:
     tolerance: float = 1e-8
     acceptance: float = 1e-5
     fixed_matrices: bool = False
+    verify: bool = True
     warm_start: bool = True
 
     def __post_init__(self) -> None:

@@ -20,8 +20,8 @@ class Solver(abc.ABC):
     """A solver for problems of one size.
 
     It never raises for a numerical failure, and calls nothing solved that is
-    not finite or breaks a row or bound: solvers were seen to report success
-    with both.
+    not finite or (unless told otherwise) breaks a row or bound: solvers were
+    seen to report success with both.
 
     Sides of rows and bounds are kept stacked, bounds first: n + m entries.
     """
@@ -44,7 +44,8 @@ class Solver(abc.ABC):
         self._excess = np.zeros(total)
         self._nearest = np.zeros(total)
         self._acceptance_squared = options.acceptance**2
-        self._crossed = np.zeros(total, dtype=np.bool_)
+        self._ordered = np.zeros(total, dtype=np.bool_)
+        self._total = total
         self._nothing = np.full(n, np.nan)
         self._checked_matrices = False
 
@@ -61,10 +62,9 @@ class Solver(abc.ABC):
         """
         if problem.matrix.shape != self._shape:
             raise ConfigurationError(f"solver for {self.size} was given a problem of {problem.size}")
-        if not self._load(problem):
-            return self._failure(QpStatus.FAILED)
-        if np.count_nonzero(np.greater(self._low, self._high, out=self._crossed)):
-            return self._failure(QpStatus.INFEASIBLE)
+        refused = self._load(problem)
+        if refused is not None:
+            return self._failure(refused)
         answer = self._solve(problem)
         if answer.status is QpStatus.SOLVED and not self._holds(answer.x, problem.matrix):
             self._forget()
@@ -83,26 +83,32 @@ class Solver(abc.ABC):
         """An answer without an x."""
         return QpSolution(x=self._nothing, status=status, iterations=iterations)
 
-    def _load(self, problem: QpProblem) -> bool:
-        """Stack the sides with finite infinities; False where any number is NaN or cannot be used."""
+    def _load(self, problem: QpProblem) -> QpStatus | None:
+        """Stack the sides with finite infinities; what to answer at once where that makes no problem."""
+        low, high, ordered = self._low, self._high, self._ordered
         self._floor[:] = problem.floor
         self._lower[:] = problem.lower
         self._ceiling[:] = problem.ceiling
         self._upper[:] = problem.upper
-        np.maximum(self._low, self._lowest, out=self._low)
-        np.minimum(self._high, self._highest, out=self._high)
+        np.maximum(low, self._lowest, out=low)
+        np.minimum(high, self._highest, out=high)
         # A sum of squares is finite only where all entries are, and costs less than isfinite.
-        total = self._low.dot(self._low) + self._high.dot(self._high)
-        total += problem.gradient.dot(problem.gradient)
-        if not (self._checked_matrices and self.options.fixed_matrices):
+        total = problem.gradient.dot(problem.gradient)
+        if not self._checked_matrices:
             hessian, matrix = problem.hessian.ravel(), problem.matrix.ravel()
             total += hessian.dot(hessian) + matrix.dot(matrix)
-        finite = bool(total < np.inf)
-        self._checked_matrices = finite
-        return finite
+        if not total < np.inf:
+            return QpStatus.FAILED
+        self._checked_matrices = self.options.fixed_matrices
+        np.less_equal(low, high, out=ordered)
+        if np.count_nonzero(ordered) == self._total:
+            return None
+        return QpStatus.FAILED if np.isnan(low + high).any() else QpStatus.INFEASIBLE
 
     def _holds(self, x: FloatArray, matrix: FloatArray) -> bool:
-        """True when x is finite and within rows and bounds."""
+        """True when x is finite and, where that is to be verified, within rows and bounds."""
+        if not self.options.verify:
+            return bool(x.dot(x) < np.inf)
         value, nearest, excess = self._value, self._nearest, self._excess
         self._value_x[:] = x
         np.dot(matrix, x, out=self._value_rows)

@@ -270,6 +270,25 @@ def test_a_solver_that_lies_is_not_believed(lie: str) -> None:
     assert liar.solve(p).status is QpStatus.FAILED
 
 
+def test_unverified_answers_are_finite_still() -> None:
+    class Liar(Solver):
+        def _solve(self, problem: QpProblem) -> QpSolution:
+            return QpSolution(x=np.array([7.0, problem.gradient[0]]), status=QpStatus.SOLVED)
+
+        def _forget(self) -> None:
+            pass
+
+        def _load(self, problem: QpProblem) -> QpStatus | None:
+            return None
+
+    p = QpProblem.empty(QpSize(variables=2, rows=1))
+    p.ceiling[0] = 6.0
+    liar = Liar(p.size, SolverOptions(verify=False))
+    assert liar.solve(p).ok
+    p.gradient[0] = np.nan
+    assert not liar.solve(p).ok
+
+
 def test_acceptance_is_relative_to_large_sides() -> None:
     class Near(Solver):
         def _solve(self, problem: QpProblem) -> QpSolution:
