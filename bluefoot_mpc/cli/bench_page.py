@@ -10,9 +10,9 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from bluefoot_mpc.viz.bench import layers_in_order
+
 _NONE = "–"
-_LAST = ("rest of the tick", "whole tick", "physics", "sensors and servos", "tick and simulation")
-"""Layers that close the timing table, in this order."""
 
 
 def bench_page(data: Mapping[str, Any]) -> tuple[RenderableType, ...]:
@@ -90,18 +90,16 @@ def _pushes(data: Mapping[str, Any]) -> Table:
 
 def _timing(name: str, columns: Mapping[str, Mapping[str, Any]]) -> Table:
     table = _table(f"Time of every layer per tick, {name}, µs: median (p99)", "layer", *columns)
-    for layer in layers_in_order(columns.values()):
+    for layer in layers_in_order(columns):
         if layer == "whole tick":
             table.add_section()
         found = (timing.get(layer) for timing in columns.values())
-        table.add_row(layer, *(_NONE if t is None else f"{t['p50']:.0f} ({t['p99']:.0f})" for t in found))
+        table.add_row(layer, *(_NONE if t is None else f"{t['p50']:.0f} ({_short(t['p99'])})" for t in found))
     return table
 
 
-def layers_in_order(timings: Any) -> list[str]:
-    """Names of all layers, those that sum up others last."""
-    names = list(dict.fromkeys(layer for timing in timings for layer in timing))
-    return [name for name in names if name not in _LAST] + [name for name in _LAST if name in names]
+def _short(microseconds: float) -> str:
+    return f"{1e-3 * microseconds:.0f}k" if microseconds >= 9999.5 else f"{microseconds:.0f}"
 
 
 def _spread(found: Mapping[str, float] | None) -> str:

@@ -34,11 +34,11 @@ STAGES: tuple[tuple[str, str, str], ...] = (
     ("_trunk", "step", "trunk reference"),
     ("_targets", "step", "inverse kinematics"),
     ("_body", "step", "planned body"),
-    (_WHOLE_BODY, "fill", "whole body: assembly"),
-    (_WHOLE_BODY, "assemble", "whole body: assembly"),
-    (_WHOLE_BODY, "free_optimum", "whole body: solve"),
-    (_WHOLE_BODY, "evaluate", "whole body: evaluation"),
-    ("_planner", "step", "whole body: rest"),
+    (_WHOLE_BODY, "fill", "WBC assembly"),
+    (_WHOLE_BODY, "assemble", "WBC assembly"),
+    (_WHOLE_BODY, "free_optimum", "WBC solve"),
+    (_WHOLE_BODY, "evaluate", "WBC evaluation"),
+    ("_planner", "step", "WBC references"),
     ("", "_goals", "servo mapping"),
 )
 """Object of the pipeline, method, layer; what a configuration does not have is left out."""
@@ -178,7 +178,7 @@ def watch_pipeline(watch: Stopwatch, pipeline: Pipeline) -> None:
         if owner is not None and hasattr(owner, method):
             _watch(watch, owner, method, name)
     for solver in part(pipeline, _SOLVERS) or ():
-        _watch(watch, solver, "solve", "whole body: solve")
+        _watch(watch, solver, "solve", "WBC solve")
 
 
 def part(pipeline: Pipeline, path: str) -> Any:

@@ -190,7 +190,7 @@ def push_panel(pushes: Mapping[str, Sequence[Data]], search: Data) -> Panel:
 
 
 def timing_panel(index: int, name: str, columns: Mapping[str, Mapping[str, Data]]) -> Panel:
-    """Mean time of every layer of the control tick, stacked, one bar per variant."""
+    """Median time of every layer of the control tick, stacked, one bar per variant."""
     layers = dict.fromkeys(layer for timing in columns.values() for layer in timing)
     traces: list[Trace] = [
         {
@@ -198,7 +198,7 @@ def timing_panel(index: int, name: str, columns: Mapping[str, Mapping[str, Data]
             "orientation": "h",
             "name": layer,
             "y": list(columns),
-            "x": [(timing.get(layer) or {}).get("mean") for timing in columns.values()],
+            "x": [(timing.get(layer) or {}).get("p50") for timing in columns.values()],
             "hovertemplate": "%{x:.0f} µs",
         }
         for layer in layers
@@ -207,7 +207,7 @@ def timing_panel(index: int, name: str, columns: Mapping[str, Mapping[str, Data]
     return Panel(
         key=f"timing-{index}",
         title=f"Where the tick goes: {name}",
-        caption="Mean time of every layer of the control tick; the table gives median and 99th percentile.",
+        caption="Median time of every layer of the control tick; its 99th percentile is in the table.",
         data=traces,
         layout={
             "barmode": "stack",
@@ -249,10 +249,16 @@ def _cells(row: Data, cases: Mapping[str, str]) -> list[str]:
     ]
 
 
+def layers_in_order(columns: Mapping[str, Mapping[str, Data]]) -> list[str]:
+    """Names of all layers, those that sum up or stand outside the tick last."""
+    names = dict.fromkeys(layer for timing in columns.values() for layer in timing)
+    last = ("rest of the tick", _TOTALS[0], *_SIMULATION, _TOTALS[1])
+    return [name for name in names if name not in last] + [name for name in last if name in names]
+
+
 def _timing_table(name: str, columns: Mapping[str, Mapping[str, Data]]) -> dict[str, Any]:
-    layers = dict.fromkeys(layer for timing in columns.values() for layer in timing)
     rows = []
-    for layer in layers:
+    for layer in layers_in_order(columns):
         found = (timing.get(layer) for timing in columns.values())
         rows.append([layer, *("–" if t is None else f"{t['p50']:.0f} ({t['p99']:.0f})" for t in found)])
     return {"name": name, "head": ["layer", *columns], "rows": rows}
