@@ -149,6 +149,6 @@ class PreviewController:
 
 
 def _solvers(config: PreviewConfig) -> tuple[Solver, ...]:
-    # The rows of a problem are others every time: there is nothing to start from.
-    options = SolverOptions(warm_start=False, max_iterations=2000)
+    # The rows of a problem are others every time: there is nothing to start from. The program checks answers.
+    options = SolverOptions(warm_start=False, max_iterations=2000, verify=False)
     return tuple(make_solver(config.solver, size, options) for size in sizes(config))

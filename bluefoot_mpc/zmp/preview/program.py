@@ -31,6 +31,8 @@ from bluefoot_mpc.zmp.preview.problem import PreviewProblem
 
 _UNIT = 1e-3
 """m, length that is one in the problem: solvers have absolute tolerances."""
+_EXACT = 1e-6
+"""m, by which an answer may miss the optimum's conditions."""
 _GRADIENT_STEPS = 200
 _GRADIENT_ROWS = 64
 
@@ -111,6 +113,9 @@ class PreviewProgram:
                     refused += 1
                     break
                 self._move(problem, optimum, responses, multiplier[:, None] * normals)
+                if not self._holds(problem.residuals.take(chosen), chosen, multiplier):
+                    refused += 1
+                    break
                 outside = problem.residuals < -self._config.tolerance
                 outside[chosen] = False
                 if not outside.any():
@@ -170,6 +175,15 @@ class PreviewProgram:
         gram.reshape(-1)[:: len(chosen) + 1] += self._softness.take(chosen)
         return gram
 
+    def _holds(self, residuals: FloatArray, chosen: Indices, multiplier: FloatArray) -> bool:
+        """True when an answer is the optimum on its rows: met ones are broken by their slack, others not.
+
+        The path is a sum of responses, which is the rest of the conditions.
+        """
+        gap = residuals + self._softness.take(chosen) * multiplier
+        # Multipliers are not negative: the product is small only where each of its terms is.
+        return bool(gap.min() > -_EXACT and gap.dot(multiplier) < _EXACT * (1.0 + multiplier.sum()))
+
     def _move(
         self, problem: PreviewProblem, optimum: FloatArray, responses: FloatArray, pull: FloatArray
     ) -> None:
@@ -199,7 +213,7 @@ class _Stage:
         return residuals.argpartition(self.count)[: self.count]
 
     def solve(self, gram: FloatArray, free: FloatArray) -> tuple[int, FloatArray | None]:
-        """Iterations, and the (k,) multipliers of the rows in 1/m; None without an answer."""
+        """Iterations, and the (k,) multipliers of the rows, not negative; None without an answer."""
         problem = self._problem
         # LAPACK by itself: numpy's way to it costs four times as much at this size.
         root, flag = dpotrf(gram.T, lower=1, clean=1, overwrite_a=1)
@@ -213,4 +227,4 @@ class _Stage:
         given = solution.row_multiplier
         multiplier = np.asarray(np.linalg.solve(problem.matrix.T, -solution.x) if given is None else given)
         usable = math.isfinite(float(multiplier.sum()))
-        return solution.iterations, multiplier * _UNIT if usable else None
+        return solution.iterations, np.maximum(multiplier, 0.0) * _UNIT if usable else None

@@ -157,6 +157,25 @@ def test_without_a_solver_the_approximate_plan_is_near(bench):
     assert np.median(gained) < 0.01
 
 
+@pytest.mark.parametrize("factor", [0.0, 0.9, 1.1, -1.0])
+def test_a_wrong_answer_is_noticed(factor):
+    class Wrong:
+        def __init__(self, size):
+            self.solver = make_solver("daqp", size, SolverOptions(warm_start=False))
+
+        def solve(self, problem):
+            right = self.solver.solve(problem)
+            return dataclasses.replace(right, row_multiplier=factor * right.row_multiplier)
+
+        def reset(self):
+            self.solver.reset()
+
+    wrong = Bench(solvers=tuple(Wrong(size) for size in sizes(CONFIG)))
+    inputs, start = next(cases(CONFIG, 1))
+    assert wrong.take(inputs, start).min() < -1e-3
+    assert not wrong.program.solve(wrong.problem).solved
+
+
 def test_a_failing_solver_leaves_the_unconstrained_optimum():
     def answer(problem):
         return QpSolution(x=np.zeros(problem.size.variables), status=QpStatus.INFEASIBLE, iterations=3)
