@@ -31,7 +31,8 @@ class ComPlan:
             positive where feet stand on one line, NaN where no support is known.
         supported: (n,) False where no foot was scheduled to stand and the region
             of a sample beside was used.
-        slack: (3,) m, largest violation of support region, reach and terminal capture point.
+        slack: (3,) m, largest violation of support region, reach and terminal capture
+            point; NaN where no support is known.
         status: where the plan comes from.
         iterations: of the solver; 0 when no constraint was met.
     """

@@ -117,6 +117,9 @@ class PreviewProblem:
         self._wanted[:] = self._nominal
         self._velocity[:] = 0.0
         self.levers[:], self._gravity[:] = self._level, 0.0
+        self._known = self._known and bool(
+            np.isfinite(self._edges).all() and np.isfinite(self._offsets).all()
+        )
 
     def evaluate(self) -> FloatArray:
         """(8n + 4,) m, residuals of the path; the array is overwritten by the next call."""

@@ -67,6 +67,7 @@ def sane(plan):
     assert all(np.isfinite(getattr(plan, name)).all() for name in ARRAYS)
     assert np.abs(plan.position).max() < 0.5
     assert np.abs(plan.acceleration).max() < 20.0
+    assert not np.isinf([*plan.margin, *plan.slack]).any()
 
 
 def test_samples_follow_from_start_and_jerks(controller):
