@@ -36,7 +36,7 @@ def preset(name: str) -> ControlConfig:
             preview=_preview(),
             gait=GaitConfig(walk_table=_walk_table()),
             posture=PostureConfig(centring=CentringConfig(enabled=True)),
-            tracking=TrackingConfig(velocity_bound=0.08),
+            tracking=TrackingConfig(velocity_bound=0.08, wait_for_ramp=True),
             ground=GroundAdaptationConfig(enabled=True),
             whole_body=BodyPlannerConfig(enabled=True),
             servo=ServoMapConfig(mixing=0.6, back_emf=1.0),

@@ -30,6 +30,7 @@ class TrackingConfig:
     heading_gain: float = 0.8  # 1/s
     heading_bound: float = 0.15  # rad/s, largest correction
     yaw_integral_gain: float = 0.3  # 1/s², slow part of the heading correction
+    wait_for_ramp: bool = False  # integrate only once the gait has reached the speed it was told
 
     def __post_init__(self) -> None:
         require_nonnegative(
@@ -80,7 +81,8 @@ def advance(
     """
     heading = yaw if math.isnan(state.heading) else wrap_angle(state.heading + wanted.yaw_rate * dt)
     error = wrap_angle(heading - yaw)
-    gain, bound = 0.0 if state.on_its_way else config.velocity_gain * dt, config.velocity_bound
+    waits = config.wait_for_ramp and state.on_its_way
+    gain, bound = 0.0 if waits else config.velocity_gain * dt, config.velocity_bound
     axes = zip(state.velocity.tolist(), wanted.velocity.tolist(), measured.tolist(), strict=True)
     velocity = np.array([min(max(slow + gain * (goal - seen), -bound), bound) for slow, goal, seen in axes])
     limit = config.heading_bound

@@ -64,14 +64,15 @@ def test_each_axis_corrects_its_own_error():
 
 
 def test_a_gait_on_its_ramp_winds_nothing_up():
+    waits = TrackingConfig(wait_for_ramp=True)
     wanted = Twist(velocity=np.array([0.4, 0.0]), yaw_rate=0.0)
     state, speed = TrackingState(), 0.0
     for _ in range(150):
-        state, corrected = tracking.advance(state, wanted, np.array([speed, 0.0]), 0.0, 0.02, CONFIG)
+        state, corrected = tracking.advance(state, wanted, np.array([speed, 0.0]), 0.0, 0.02, waits)
         speed = min(0.4, speed + 0.002)
         state = tracking.followed(state, corrected, np.array([speed, 0.0]))
     assert state.on_its_way
     # One tick passed before the ramp was known.
-    assert state.velocity[0] <= CONFIG.velocity_gain * 0.02 * 0.4 + 1e-12
+    assert state.velocity[0] <= waits.velocity_gain * 0.02 * 0.4 + 1e-12
     reached = tracking.followed(state, wanted, np.array([0.4, 0.0]))
-    assert tracking.advance(reached, wanted, np.array([0.3, 0.0]), 0.0, 0.02, CONFIG)[0].velocity[0] > 0.0
+    assert tracking.advance(reached, wanted, np.array([0.3, 0.0]), 0.0, 0.02, waits)[0].velocity[0] > 0.0
