@@ -14,6 +14,16 @@ COLOURS = (NEUTRAL, ESTIMATE, GOOD, COMMAND, COM, ZMP)
 _TOTALS = ("whole tick", "tick and simulation")
 _SIMULATION = ("physics", "sensors and servos")
 
+_POLAR = {
+    "bgcolor": "rgba(0,0,0,0)",
+    "angularaxis": {
+        "rotation": 90, "direction": "counterclockwise", "gridcolor": "@line", "linecolor": "@line",
+        "tickvals": [0, 90, 180, 270], "ticktext": ["forward", "left", "back", "right"],
+    },
+    "radialaxis": {"ticksuffix": " N·s", "gridcolor": "@line", "linecolor": "@line", "rangemode": "tozero"},
+}  # fmt: skip
+"""Seen from above, forward is up."""
+
 Data = Mapping[str, Any]
 
 
@@ -62,35 +72,11 @@ def bench_panels(data: Data) -> list[Panel]:
 
 def tilt_panel(data: Data) -> Panel:
     """Bars of the median tilt of every variant in every case, whiskers to the best and the worst seed."""
-    traces: list[Trace] = []
-    for index, variant in enumerate(data["variants"]):
-        rows = [row for row in data["ablation"] if row["variant"] == variant]
-        found = [row["figures"]["tilt_rms_deg"] for row in rows]
-        middle = [None if f is None else f["median"] for f in found]
-        traces.append(
-            {
-                "type": "bar",
-                "name": variant,
-                "x": [data["cases"][row["case"]] for row in rows],
-                "y": middle,
-                "marker": {"color": COLOURS[index % len(COLOURS)]},
-                "error_y": {
-                    "type": "data",
-                    "symmetric": False,
-                    "array": [None if f is None else f["max"] - f["median"] for f in found],
-                    "arrayminus": [None if f is None else f["median"] - f["min"] for f in found],
-                    "thickness": 1.2,
-                    "width": 3,
-                    "color": "@ink",
-                },
-                "hovertemplate": "%{y:.2f}°",
-            }
-        )
     return Panel(
         key="tilt",
         title="How much the trunk tilts",
         caption="RMS of roll and pitch together, unsmoothed truth; bar: median seed, whisker: best to worst.",
-        data=traces,
+        data=[_tilt_bars(data, index, variant) for index, variant in enumerate(data["variants"])],
         layout={"barmode": "group", "yaxis": {"title": {"text": "degrees RMS"}, "rangemode": "tozero"}},
         height=380,
         wide=True,
@@ -98,40 +84,38 @@ def tilt_panel(data: Data) -> Panel:
     )
 
 
+def _tilt_bars(data: Data, index: int, variant: str) -> Trace:
+    rows = [row for row in data["ablation"] if row["variant"] == variant]
+    found = [row["figures"]["tilt_rms_deg"] for row in rows]
+    return {
+        "type": "bar",
+        "name": variant,
+        "x": [data["cases"][row["case"]] for row in rows],
+        "y": [None if f is None else f["median"] for f in found],
+        "marker": {"color": _colour(index)},
+        "error_y": {
+            "type": "data",
+            "symmetric": False,
+            "array": [None if f is None else f["max"] - f["median"] for f in found],
+            "arrayminus": [None if f is None else f["median"] - f["min"] for f in found],
+            "thickness": 1.2,
+            "width": 3,
+            "color": "@ink",
+        },
+        "hovertemplate": "%{y:.2f}°",
+    }
+
+
 def ratio_panel(data: Data) -> Panel:
     """Tilt of every variant over that of the first, with its interval."""
-    traces: list[Trace] = []
-    for index, variant in enumerate(data["variants"]):
-        rows = [row for row in data["ablation"] if row["variant"] == variant]
-        known = [row for row in rows if (row["against_first"].get("tilt_rms_deg") or {}).get("ratio")]
-        if not known:
-            continue
-        ratios = [row["against_first"]["tilt_rms_deg"]["ratio"] for row in known]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "markers",
-                "name": variant,
-                "x": [ratio["value"] for ratio in ratios],
-                "y": [data["cases"][row["case"]] for row in known],
-                "marker": {"color": COLOURS[index % len(COLOURS)], "size": 9},
-                "error_x": {
-                    "type": "data",
-                    "symmetric": False,
-                    "array": [ratio["high"] - ratio["value"] for ratio in ratios],
-                    "arrayminus": [ratio["value"] - ratio["low"] for ratio in ratios],
-                    "color": COLOURS[index % len(COLOURS)],
-                },
-                "hovertemplate": "%{x:.2f}",
-            }
-        )
+    traces = [_ratios(data, index, variant) for index, variant in enumerate(data["variants"])]
     first = next(iter(data["variants"]), "")
     line = {"color": NEUTRAL, "width": 1, "dash": "dot"}
     return Panel(
         key="ratio",
         title=f"Tilt as a part of {first}'s",
         caption="Geometric mean over pairs of runs of the same seed, with its bootstrap 95 % interval.",
-        data=traces,
+        data=[trace for trace in traces if trace["x"]],
         layout={
             "hovermode": "closest",
             "xaxis": {"title": {"text": f"tilt over that of {first}"}, "rangemode": "tozero"},
@@ -143,6 +127,28 @@ def ratio_panel(data: Data) -> Panel:
     )
 
 
+def _ratios(data: Data, index: int, variant: str) -> Trace:
+    rows = [row for row in data["ablation"] if row["variant"] == variant]
+    known = [row for row in rows if (row["against_first"].get("tilt_rms_deg") or {}).get("ratio")]
+    ratios = [row["against_first"]["tilt_rms_deg"]["ratio"] for row in known]
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": variant,
+        "x": [ratio["value"] for ratio in ratios],
+        "y": [data["cases"][row["case"]] for row in known],
+        "marker": {"color": _colour(index), "size": 9},
+        "error_x": {
+            "type": "data",
+            "symmetric": False,
+            "array": [ratio["high"] - ratio["value"] for ratio in ratios],
+            "arrayminus": [ratio["value"] - ratio["low"] for ratio in ratios],
+            "color": _colour(index),
+        },
+        "hovertemplate": "%{x:.2f}",
+    }
+
+
 def push_panel(pushes: Mapping[str, Sequence[Data]], search: Data) -> Panel:
     """Polar picture of the largest push that is survived: median robot, and the weakest.
 
@@ -150,43 +156,35 @@ def push_panel(pushes: Mapping[str, Sequence[Data]], search: Data) -> Panel:
         pushes: controller to limits by direction (``direction_deg, median_ns, least_ns``).
         search: how they were looked for.
     """
-    traces: list[Trace] = []
-    for index, (controller, limits) in enumerate(pushes.items()):
-        closed = [*limits, limits[0]]
-        colour = COLOURS[index % len(COLOURS)]
-        for name, key, dash in (("median", "median_ns", "solid"), ("weakest", "least_ns", "dot")):
-            traces.append(
-                {
-                    "type": "scatterpolar",
-                    "mode": "lines+markers",
-                    "name": f"{controller}, {name} robot",
-                    "theta": [limit["direction_deg"] for limit in closed],
-                    "r": [limit[key] for limit in closed],
-                    "line": {"color": colour, "dash": dash},
-                    "marker": {"size": 5},
-                    "hovertemplate": "%{r:.2f} N·s to %{theta:.0f}°",
-                }
-            )
-    polar = {
-        "bgcolor": "rgba(0,0,0,0)",
-        "angularaxis": {
-            "rotation": 90, "direction": "counterclockwise", "gridcolor": "@line", "linecolor": "@line",
-            "tickvals": [0, 90, 180, 270], "ticktext": ["forward", "left", "back", "right"],
-        },
-        "radialaxis": {
-            "ticksuffix": " N·s", "gridcolor": "@line", "linecolor": "@line", "rangemode": "tozero",
-        },
-    }  # fmt: skip
+    lines = (("median", "median_ns", "solid"), ("weakest", "least_ns", "dot"))
     return Panel(
         key="pushes",
         title="Largest push survived",
         caption=f"0.1 s on the trunk, trot at {1e3 * search['speed']:.0f} mm/s, {search['seeds']} robots "
         "pushed at different parts of the cycle; by the direction that the push points to.",
-        data=traces,
-        layout={"polar": polar, "hovermode": "closest", "margin": {"l": 40, "r": 40}},
+        data=[
+            _push_line(f"{controller}, {name} robot", limits, key, {"color": _colour(index), "dash": dash})
+            for index, (controller, limits) in enumerate(pushes.items())
+            for name, key, dash in lines
+        ],
+        layout={"polar": _POLAR, "hovermode": "closest", "margin": {"l": 40, "r": 40}},
         height=460,
         time=False,
     )
+
+
+def _push_line(name: str, limits: Sequence[Data], key: str, line: Data) -> Trace:
+    closed = [*limits, limits[0]]
+    return {
+        "type": "scatterpolar",
+        "mode": "lines+markers",
+        "name": name,
+        "theta": [limit["direction_deg"] for limit in closed],
+        "r": [limit[key] for limit in closed],
+        "line": line,
+        "marker": {"size": 5},
+        "hovertemplate": "%{r:.2f} N·s to %{theta:.0f}°",
+    }
 
 
 def timing_panel(index: int, name: str, columns: Mapping[str, Mapping[str, Data]]) -> Panel:
@@ -218,6 +216,10 @@ def timing_panel(index: int, name: str, columns: Mapping[str, Mapping[str, Data]
         height=340,
         time=False,
     )
+
+
+def _colour(index: int) -> str:
+    return COLOURS[index % len(COLOURS)]
 
 
 def _headline(data: Data, missed: Sequence[Data]) -> str:
