@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from bluefoot_mpc.qp import QpProblem, QpSize
@@ -85,3 +87,49 @@ def series(seed: int, count: int, fixed_matrices: bool = False) -> list[QpProble
         )  # fmt: skip
         problems.append(p)
     return problems
+
+
+@functools.cache
+def hard_problem(seed: int, index: int, spread: float) -> QpProblem:
+    """One of a series with badly scaled costs, empty, repeated and dependent rows, and fixed variables.
+
+    Those named in the tests are the ones of many thousands that a solver failed on as it comes.
+    """
+    rng = np.random.default_rng(seed)
+    for _ in range(index):
+        _hard(rng, spread)
+    return _hard(rng, spread)
+
+
+def _hard(rng: np.random.Generator, spread: float) -> QpProblem:
+    n, m = 28, 32
+    p = QpProblem.empty(QpSize(variables=n, rows=m))
+    root, scale = rng.normal(size=(n, n)), 10.0 ** rng.uniform(-spread, spread)
+    p.hessian[:] = scale * (root.T @ root) / n + 10.0 ** rng.uniform(-6, -2) * np.eye(n)
+    p.gradient[:] = rng.normal(size=n) * 10.0 ** rng.uniform(-2, 3)
+    p.matrix[:] = rng.normal(size=(m, n))
+    if rng.random() < 0.3:
+        p.matrix[rng.random(p.matrix.shape) < 0.6] = 0.0
+    if rng.random() < 0.3:
+        p.matrix[m // 2 :] = 0.0
+    x = rng.normal(size=n) * 0.5
+    value = p.matrix @ x
+    equalities, below = int(rng.integers(0, 8)), rng.exponential(size=m)
+    p.lower[:], p.upper[:] = value - below, value + rng.exponential(size=m)
+    p.lower[:equalities] = p.upper[:equalities] = value[:equalities]
+    if rng.random() < 0.3 and equalities > 2:
+        p.matrix[1], p.lower[1], p.upper[1] = 2 * p.matrix[0], 2 * p.lower[0], 2 * p.lower[0]
+    if rng.random() < 0.3:
+        p.matrix[-1], p.lower[-1], p.upper[-1] = p.matrix[-2], p.lower[-2], p.upper[-2]
+    for side, none in ((p.upper, INF), (p.lower, -INF)):
+        free = rng.random(m) < 0.3
+        free[:equalities] = False
+        side[free] = none
+    bounded = rng.random(n) < 0.6
+    p.floor[bounded] = x[bounded] - rng.exponential(size=bounded.sum())
+    bounded = rng.random(n) < 0.6
+    p.ceiling[bounded] = x[bounded] + rng.exponential(size=bounded.sum())
+    if rng.random() < 0.1:
+        j = rng.integers(n)
+        p.floor[j] = p.ceiling[j] = x[j]
+    return p

@@ -21,7 +21,7 @@ from bluefoot_mpc.qp import (
     registry,
     residuals,
 )
-from tests.qp.problems import known, random_problem, series
+from tests.qp.problems import hard_problem, known, random_problem, series
 
 MAIN = ("daqp", "proxsuite")
 SIZE = QpSize(variables=28, rows=32)
@@ -220,12 +220,25 @@ def test_nearly_flat_cost_is_held_by_bounds(name: str) -> None:
     np.testing.assert_allclose(answer.x, [-50.0, 50.0], atol=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("seed", "index", "spread"), [(2, 833, 0.0), (11, 965, 0.0), (13, 79, 2.0), (13, 2977, 2.0)]
+)
 @pytest.mark.parametrize("name", MAIN)
-def test_rows_may_turn_into_equalities_and_back(name: str) -> None:
+def test_problems_that_broke_a_solver(name: str, seed: int, index: int, spread: float) -> None:
+    """The first is daqp's, from equalities said twice, the others proxsuite's."""
+    p = hard_problem(seed, index, spread)
+    answer = make_solver(name, SIZE).solve(p)
+    assert answer.ok
+    assert residuals(p, answer).worst < 1e-5 * (1.0 + np.abs(p.gradient).max())
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+@pytest.mark.parametrize("name", MAIN)
+def test_rows_may_turn_into_equalities_and_back(name: str, fixed: bool) -> None:
     """Feet are switched by the sides of rows, in a solver of one size."""
-    solver = make_solver(name, SIZE)
+    solver = make_solver(name, SIZE, SolverOptions(fixed_matrices=fixed))
     rng = np.random.default_rng(12)
-    problems = series(12, 40)
+    problems = series(12, 40, fixed)
     for k, p in enumerate(problems):
         rows = rng.choice(np.arange(10, 28), size=4 * (k // 3 % 3), replace=False)
         inside = make_solver("daqp", SIZE).solve(p).x

@@ -89,7 +89,7 @@ class DaqpSolver(Solver):
         if not self.options.warm_start:
             sense = self._mark(start=None)
         elif self._equal.tobytes() != self._equal_before:
-            # daqp never frees an equality by itself: say anew which rows are one
+            # older versions never free an equality by themselves; said anew, 0.11 needs fewer steps too
             sense = self._mark(start=self._multiplier)
         if self.options.fixed_matrices:
             flag = model.update(f=problem.gradient, bupper=self._high, blower=self._low, sense=sense)
