@@ -4,7 +4,8 @@ The paper's laws know one ground, the horizontal plane of b'. On a ramp the
 slow trim has to tilt the trunk back over its feet; here the feet are told where
 the ground is instead. Heights are measured by forward kinematics against
 gravity, so how the trunk tilts does not enter them: there is no loop through
-the servos that could ring.
+the servos that could ring, and the plane can follow within two ticks. A floor
+that surprised the feet lately is stepped over higher.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from bluefoot_mpc.types import BoolArray, FloatArray
 
 _LEAST_SPREAD = 1e-4
 """m², below it the standing feet are too close together to show a slope."""
+_LIFT_RATE = 5.0
+"""1/s, fastest change of the factor on the step height."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -26,13 +29,19 @@ class GroundAdaptationConfig:
     """How the feet follow the slope of the ground."""
 
     enabled: bool = False  # off, the ground is the horizontal plane of the paper's laws
-    time_constant: float = 0.15  # s, with which the slope follows the standing feet
+    time_constant: float = 0.03  # s, with which the slope follows the standing feet
     max_slope: float = 0.27  # rise per metre (15°), steepest ground that the feet are put on
-    max_rate: float = 0.5  # 1/s, fastest change of the slope
+    max_rate: float = 3.0  # 1/s, fastest change of the slope
+    even: float = 0.0015  # m, off the plane by which feet land on even ground at most
+    extra_lift: float = 0.35  # share by which steps are higher after twice that much
+    memory: float = 6.0  # s, for which an uneven place is remembered
 
     def __post_init__(self) -> None:
-        require_positive(time_constant=self.time_constant, max_rate=self.max_rate)
+        require_positive(
+            time_constant=self.time_constant, max_rate=self.max_rate, even=self.even, memory=self.memory
+        )
         require_range(0.0, 0.6, max_slope=self.max_slope)
+        require_range(0.0, 2.0, extra_lift=self.extra_lift)
 
 
 class GroundAdapter:
@@ -44,6 +53,8 @@ class GroundAdapter:
 
     Attributes:
         slope: (2,) rise per metre along x and y of b'.
+        unevenness: m, how far off the plane a foot landed lately.
+        lift: factor on the height of swinging feet, 1 on even ground.
 
     Args:
         config: speed and bounds.
@@ -54,54 +65,79 @@ class GroundAdapter:
         self.reset()
 
     def reset(self) -> None:
-        """Level ground."""
+        """Level, even ground."""
         self.slope = np.zeros(2)
+        self.unevenness = 0.0
+        self.lift = 1.0
 
-    def step(self, feet: FloatArray, standing: BoolArray, dt: float) -> None:
+    def step(self, feet: FloatArray, standing: BoolArray, dt: float, *, walking: bool = True) -> None:
         """Take the feet of one tick.
 
         Args:
             feet: (4, 3) m, measured feet from the trunk, axes of b'.
             standing: (4,) feet that touch and are scheduled to stand.
             dt: s.
+            walking: True while the robot walks; ground that it is put on is no surprise.
         """
         config = self._config
         if not config.enabled:
             return
         points = [place for place, stands in zip(feet.tolist(), standing.tolist(), strict=True) if stands]
-        if len(points) < 2 or not all(math.isfinite(value) for point in points for value in point):
-            return
-        toward = _slope_error(points, self.slope.tolist())
-        share = min(1.0, dt / config.time_constant)
-        step = _shortened(share * toward[0], share * toward[1], config.max_rate * dt)
-        slope_x, slope_y = self.slope.tolist()
-        self.slope = np.array(_shortened(slope_x + step[0], slope_y + step[1], config.max_slope))
+        known = all(math.isfinite(value) for point in points for value in point)
+        surprise = 0.0
+        if len(points) > 1 and known:
+            surprise = self._follow(points, dt)
+        kept = self.unevenness * math.exp(-dt / config.memory)
+        self.unevenness = max(kept, surprise) if walking else kept
+        share = min(1.0, max(0.0, self.unevenness / config.even - 1.0))
+        most = _LIFT_RATE * dt
+        self.lift += min(most, max(-most, 1.0 + share * config.extra_lift - self.lift))
 
-    def place(self, feet: FloatArray) -> FloatArray:
-        """(4, 3) m, feet wanted on level ground in b', put on the ground that was seen."""
-        if not self.slope.any():
+    def place(self, feet: FloatArray, height: FloatArray | None = None) -> FloatArray:
+        """(4, 3) m, feet wanted on level ground in b', put on the ground that was seen.
+
+        Args:
+            feet: (4, 3) m, wanted feet.
+            height: (4,) m, how much of their height is above the ground; None for feet that stand.
+        """
+        if self.lift == 1.0 and not self.slope.any():
             return feet
         placed = feet.copy()
         placed[:, 2] += feet[:, :2] @ self.slope
+        if height is not None:
+            placed[:, 2] += (self.lift - 1.0) * height
         return placed
 
+    def _follow(self, points: list[list[float]], dt: float) -> float:
+        """Turn the slope towards the plane through points (m); gives how far off it one lies, m."""
+        config = self._config
+        slope_x, slope_y = self.slope.tolist()
+        (error_x, error_y), off = _slope_error(points, (slope_x, slope_y))
+        share = min(1.0, dt / config.time_constant)
+        step = _shortened(share * error_x, share * error_y, config.max_rate * dt)
+        self.slope = np.array(_shortened(slope_x + step[0], slope_y + step[1], config.max_slope))
+        return off
 
-def _slope_error(points: list[list[float]], slope: list[float]) -> tuple[float, float]:
-    """By how much the plane through points (m) is steeper than `slope`, seen along their longest extent.
+
+def _slope_error(points: list[list[float]], slope: tuple[float, float]) -> tuple[tuple[float, float], float]:
+    """By how much the plane through points (m) is steeper than `slope`, and how far off one is, m.
 
     A step of steepest descent on the squared height errors, of the size that
     removes the whole error along the direction in which the points lie apart most.
     """
     n = len(points)
     mean = [sum(column) / n for column in zip(*points, strict=True)]
-    xx = xy = yy = along_x = along_y = 0.0
+    xx = xy = yy = along_x = along_y = off = 0.0
     for point in points:
         x, y, z = (value - middle for value, middle in zip(point, mean, strict=True))
         error = z - slope[0] * x - slope[1] * y
+        off = max(off, abs(error))
         xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
         along_x, along_y = along_x + x * error, along_y + y * error
     spread = 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
-    return (along_x / spread, along_y / spread) if spread > _LEAST_SPREAD else (0.0, 0.0)
+    if spread <= _LEAST_SPREAD:
+        return (0.0, 0.0), 0.0
+    return (along_x / spread, along_y / spread), off
 
 
 def _shortened(x: float, y: float, most: float) -> tuple[float, float]:

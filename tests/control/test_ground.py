@@ -1,3 +1,4 @@
+import itertools
 import math
 
 import numpy as np
@@ -47,6 +48,39 @@ def test_one_diagonal_leaves_the_other_direction_as_it_was():
     assert ground.slope @ across == pytest.approx(0.0, abs=1e-9)
 
 
+def test_uneven_ground_is_stepped_over_higher_for_a_while():
+    ground = adapter(extra_lift=0.4, memory=2.0)
+    lifts = []
+    for k in range(1000):
+        feet = on_plane((0.0, 0.0))
+        feet[0, 2] += 0.01 if k == 100 else 0.0
+        ground.step(feet, DIAGONALS[0], DT)
+        lifts.append(ground.lift)
+    assert lifts[99] == 1.0
+    assert max(abs(b - a) for a, b in itertools.pairwise(lifts)) <= 0.1 + 1e-12
+    assert max(lifts) == pytest.approx(1.4)
+    assert lifts[-1] == pytest.approx(1.0)
+
+
+def test_a_higher_step_raises_feet_in_the_air_only():
+    ground = adapter(extra_lift=0.4)
+    for k in range(20):
+        feet = on_plane((0.0, 0.0))
+        feet[0, 2] += 0.01 if k == 0 else 0.0
+        ground.step(feet, DIAGONALS[0], DT)
+    ground.slope[:] = 0.0
+    placed = ground.place(FEET, np.array([0.02, 0.0, 0.0, 0.01]))
+    np.testing.assert_allclose(placed[:, 2], [0.008, 0.0, 0.0, 0.004])
+
+
+@pytest.mark.parametrize("walking", [True, False])
+def test_only_walking_over_it_shows_uneven_ground(walking):
+    ground = adapter()
+    for _ in range(50):
+        ground.step(on_plane((0.14, 0.0)), ALL, DT, walking=walking)
+    assert (ground.unevenness > 0.0) is walking
+
+
 def test_feet_are_put_on_the_plane_that_was_seen():
     ground = adapter()
     for _ in range(200):
@@ -94,7 +128,7 @@ def test_feet_in_one_place_change_nothing():
 def test_switched_off_the_ground_is_level():
     ground = GroundAdapter(GroundAdaptationConfig())
     ground.step(on_plane((0.1, 0.1)), ALL, DT)
-    assert ground.place(FEET) is FEET
+    assert ground.place(FEET, np.ones(4)) is FEET
 
 
 def test_reset_forgets_the_slope():
@@ -105,7 +139,9 @@ def test_reset_forgets_the_slope():
     assert not ground.slope.any()
 
 
-@pytest.mark.parametrize("bad", [{"time_constant": 0.0}, {"max_slope": 2.0}, {"max_rate": -1.0}])
+@pytest.mark.parametrize(
+    "bad", [{"time_constant": 0.0}, {"max_slope": 2.0}, {"max_rate": -1.0}, {"extra_lift": -1.0}]
+)
 def test_impossible_values_are_refused(bad):
     with pytest.raises(ConfigurationError, match=next(iter(bad))):
         GroundAdaptationConfig(**bad)
