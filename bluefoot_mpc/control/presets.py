@@ -13,6 +13,7 @@ from bluefoot_mpc.control.tracking import TrackingConfig
 from bluefoot_mpc.exceptions import UnknownNameError
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.table import GaitTable
+from bluefoot_mpc.gait.tuned import TROT
 from bluefoot_mpc.zmp.preview.config import PreviewConfig, PreviewWeights
 from bluefoot_mpc.zmp.support import SupportConfig
 
@@ -34,9 +35,9 @@ def preset(name: str) -> ControlConfig:
         return ControlConfig(
             sway=SwayConfig(trot="static", walk="preview"),
             preview=_preview(),
-            gait=GaitConfig(walk_table=_walk_table()),
+            gait=GaitConfig(trot_table=TROT, walk_table=_walk_table()),
             posture=PostureConfig(centring=CentringConfig(enabled=True)),
-            tracking=TrackingConfig(velocity_bound=0.08, wait_for_ramp=True),
+            tracking=TrackingConfig(velocity_gain=0.8, velocity_bound=0.08, wait_for_ramp=True),
             ground=GroundAdaptationConfig(enabled=True),
             whole_body=BodyPlannerConfig(enabled=True),
             servo=ServoMapConfig(mixing=0.6, back_emf=1.0),
