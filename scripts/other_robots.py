@@ -3,6 +3,7 @@
     python scripts/other_robots.py
     python scripts/other_robots.py anymal --duration 20 --solver proxsuite
     python scripts/other_robots.py --sway 0.2 --squat 0.15 --period 1.2 --limit 100
+    python scripts/other_robots.py --push 0.3 --limit 100
     python scripts/other_robots.py --json --picture runs/other_robots.png
 
 Their URDFs come from example-robot-data: pip install 'bluefoot-mpc[robots]'. The state is
@@ -58,7 +59,7 @@ def main() -> int:
     arguments = _arguments()
     try:
         body = WholeBodyConfig(solver=arguments.solver, free_first=not arguments.always_solve)
-        motion = {name: getattr(arguments, name) for name in ("duration", "squat", "sway", "period")}
+        motion = {name: getattr(arguments, name) for name in ("duration", "squat", "sway", "period", "push")}
         config = BalanceConfig(body=body, **motion)
         runs = [run_balance(load_library_robot(name), config) for name in arguments.robots or LIBRARY]
     except BlueFootError as error:
@@ -153,6 +154,7 @@ def _arguments() -> argparse.Namespace:
         ("squat", "up and down, of the height of the centre of mass"),
         ("sway", "radius of the circle, of that height"),
         ("period", "s of a squat and of a circle"),
+        ("push", "N·s per kg on the trunk to the left, while it stands"),
     ):
         parser.add_argument(f"--{name}", type=float, default=getattr(defaults, name), help=what)
     parser.add_argument("--solver", default=WholeBodyConfig().solver, help="backend of the whole-body QP")

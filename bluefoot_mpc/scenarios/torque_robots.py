@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -21,6 +22,9 @@ from bluefoot_mpc.settings import require_nonnegative, require_positive
 from bluefoot_mpc.sim.torque_robot import TorqueRobot, TorqueWorldConfig
 from bluefoot_mpc.types import BoolArray, Fallback, FloatArray
 from bluefoot_mpc.wbc import WholeBodyConfig, WholeBodyController, WholeBodyInputs, WholeBodyModel
+
+_PUSH_TIME = 0.1
+"""s that a push lasts; it begins when a quarter of the standing is over."""
 
 _FALLEN_TILT = math.radians(45.0)
 _FALLEN_HEIGHT = 0.5
@@ -37,13 +41,14 @@ class BalanceConfig:
     squat: float = 0.12  # of the standing height of the centre of mass, up and down
     sway: float = 0.10  # of that height, radius of the circle, fore-aft and sideways
     period: float = 2.0  # s of a squat, and of a circle
+    push: float = 0.0  # N·s per kg of the robot, on the trunk to the left, while it stands
     control_period: float = 0.002  # s
     friction: float = 0.8  # Coulomb, feet on the ground
     body: WholeBodyConfig = field(default_factory=WholeBodyConfig)
 
     def __post_init__(self) -> None:
         require_positive(duration=self.duration, period=self.period, control_period=self.control_period)
-        require_nonnegative(squat=self.squat, sway=self.sway, friction=self.friction)
+        require_nonnegative(squat=self.squat, sway=self.sway, push=self.push, friction=self.friction)
 
     @property
     def bounds(self) -> tuple[float, ...]:
@@ -97,7 +102,8 @@ class BalanceRun:
         return error[(self.time >= begin) & (self.time < end)]
 
 
-Reference = Callable[[float], tuple[FloatArray, FloatArray, FloatArray]]
+Motion = tuple[FloatArray, FloatArray, FloatArray]
+Reference = Callable[[float], Motion]
 
 
 def balance_reference(start: FloatArray, config: BalanceConfig) -> Reference:
@@ -115,7 +121,7 @@ def balance_reference(start: FloatArray, config: BalanceConfig) -> Reference:
     ramp = min(0.5 * config.period, 0.25 * (end - squatted))
     squat, sway = config.squat * start[2], config.sway * start[2]
 
-    def reference(now: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def reference(now: float) -> Motion:
         down, around = now - stood, now - squatted
         swell = _window(down, squatted - stood, ramp)
         turn = _window(around, end - squatted, ramp)
@@ -142,9 +148,11 @@ def run_balance(robot: LibraryRobot, config: BalanceConfig | None = None) -> Bal
     loop = _Loop(world, WholeBodyController(model, config.body))
     reference = balance_reference(loop.com, config)
     height, fell, rows = float(loop.com[2]), False, []
+    force, begin = np.array([0.0, config.push * model.mass / _PUSH_TIME, 0.0]), 0.25 * config.bounds[0]
     for tick in range(round(config.duration / config.control_period)):
-        wanted = reference(tick * config.control_period)
-        rows.append(loop.step(wanted, config.control_period))
+        now = tick * config.control_period
+        push = force if begin <= now < begin + _PUSH_TIME else None
+        rows.append(loop.step(reference(now), config.control_period, push))
         fell = bool(loop.tilt > _FALLEN_TILT or loop.com[2] < _FALLEN_HEIGHT * height)
         if fell:
             break
@@ -169,7 +177,7 @@ class _Loop:
         self._feet_start = self._feet
         self._contact = np.ones(len(self._model.feet), dtype=np.bool_)
 
-    def step(self, wanted: tuple[FloatArray, FloatArray, FloatArray], dt: float) -> dict[str, FloatArray]:
+    def step(self, wanted: Motion, dt: float, push: FloatArray | None) -> dict[str, Any]:
         """One tick; what was there at its beginning, and what was done."""
         world, model = self._world, self._model
         inputs = WholeBodyInputs(
@@ -185,7 +193,7 @@ class _Loop:
             "torque": plan.torque, "tick": np.array(spent),
             "solved": np.array(plan.status is Fallback.SOLVED), "iterations": np.array(plan.iterations),
         }  # fmt: skip
-        world.step(plan.torque, dt)
+        world.step(plan.torque, dt, push)
         row["force"] = world.foot_force
         self._look()
         return row

@@ -84,10 +84,14 @@ class TorqueRobot:
         spec = _robot_spec(urdf, feet, self.config)
         self._joints = _add_motors(spec, pin_model)
         _set_world(spec, np.array(pin_model.gravity.linear), self.config)
-        self.model = spec.compile()
+        try:
+            self.model = spec.compile()
+        except ValueError as error:
+            raise ConfigurationError(f"{urdf}: {error}") from error
         self.data = mujoco.MjData(self.model)
         self._qpos = np.array([self.model.joint(name).qposadr[0] for name in self._joints])
         self._qvel = np.array([self.model.joint(name).dofadr[0] for name in self._joints])
+        self._root = int(self.model.jnt_bodyid[self.model.joint(_ROOT).id])
         self._forces = self.data.sensordata.reshape(len(feet), _SENSED)[:, 1:]
         self.reset()
 
@@ -99,12 +103,13 @@ class TorqueRobot:
         qpos[self._qpos] = q[7:]
         mujoco.mj_forward(self.model, self.data)
 
-    def step(self, torque: FloatArray, dt: float) -> None:
+    def step(self, torque: FloatArray, dt: float, push: FloatArray | None = None) -> None:
         """Hold joint torques for a while.
 
         Args:
             torque: (nj,) N·m, cut to the motors' limits.
             dt: s, a whole number of physics periods.
+            push: (3,) N on the centre of mass of the root's link, world axes; None: none.
 
         Raises:
             SimulationError: the torque or the state is not finite any more.
@@ -118,6 +123,7 @@ class TorqueRobot:
         if not np.isfinite(torque).all():
             raise SimulationError(f"torque that is not finite at t = {self.data.time:.3f} s")
         self.data.ctrl[:] = torque
+        self.data.xfrc_applied[self._root, :3] = 0.0 if push is None else push
         mujoco.mj_step(self.model, self.data, nstep=steps)
         if not (np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all()):
             raise SimulationError(f"the physics blew up at t = {self.data.time:.3f} s")
@@ -190,7 +196,7 @@ def _make_possible(inertia: ET.Element) -> None:
     """Replace a tensor that no body can have (ANYmal's dummy link has one) by a ball's of like size."""
     xx, xy, xz, yy, yz, zz = (float(inertia.get(key, 0.0)) for key in _TENSOR)
     low, middle, high = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if low <= 0.0 or low + middle < high:
+    if low + middle < high:
         mean = str((xx + yy + zz) / 3.0)
         inertia.attrib.update(dict.fromkeys(_TENSOR, "0"), ixx=mean, iyy=mean, izz=mean)
 

@@ -121,6 +121,22 @@ def test_torques_reach_their_joints_and_stop_at_the_motors_limits(robot, pin_mod
     assert robot.data.actuator_force[names.index("a_hip")] == pytest.approx(100.0)
 
 
+def test_a_push_moves_the_trunk_and_then_stops(robot, pin_model):
+    mass = pin.computeTotalMass(pin_model)
+    robot.data.qpos[2] = 5.0  # in the air nothing else acts sideways
+    robot.step(np.zeros(4), 0.001, np.array([0.0, 500.0 * mass, 0.0]))
+    pushed = momentum(robot, pin_model)[1]
+    assert pushed == pytest.approx(0.5 * mass, rel=1e-2)
+    robot.step(np.zeros(4), 0.010)
+    assert momentum(robot, pin_model)[1] == pytest.approx(pushed, rel=1e-2)
+
+
+def momentum(robot, pin_model):
+    data = pin_model.createData()
+    pin.computeCentroidalMomentum(pin_model, data, robot.q, robot.v)
+    return data.hg.linear
+
+
 def test_reset_is_the_state_after_init_bit_for_bit(robot):
     first = (robot.q, robot.v, robot.foot_force)
     robot.step(np.ones(4), 0.005)
