@@ -59,6 +59,8 @@ def test_other_code_or_other_options_make_old_results_worthless(calls, tmp_path,
     assert Store(tmp_path / "store.jsonl").get(CASE, 0) is None
     changed = Case(name="made up", scenario="stand", options={"duration": 2.0})
     assert store.get(changed, 0) is None
+    turned = Case(name="made up", scenario="stand", options=CASE.options, directions=4)
+    assert store.get(turned, 0) is None
 
 
 def test_the_worst_seed_decides():
