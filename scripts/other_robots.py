@@ -46,8 +46,8 @@ COLUMNS = {
     "force_min": "foot force\nmin N",
     "force_max": "foot force\nmax N",
     "torque_max": "torque\nmax N·m",
-    "solved": "optimum\n% of ticks",
-    "limited": "limits met\n% of ticks",
+    "solved": "optimum\n% ticks",
+    "limited": "limits\nmet %",
     "tick_median": "tick\np50 µs",
     "tick_p99": "tick\np99 µs",
 }
