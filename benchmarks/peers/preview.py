@@ -1,7 +1,8 @@
 """The preview over 32 samples: ours, and solvers that set up and factor the same problem on every tick.
 
 ``plain``: both axes in jerks, the rows of our problem with a slack for every
-point. ``box``: two problems of one axis each, supports and reach as boxes,
+point. ``hard``: the same without slacks; it has no answer where the rows leave
+none. ``box``: two problems of one axis each, supports and reach as boxes,
 without slacks: not the same problem, but the least that a preview can be. The
 peers' matrices are assembled before and not counted; ours are.
 """
@@ -60,6 +61,7 @@ class Peers:
         controller = PreviewController(config)
         plain = Plain(controller)
         self.plain: list[Dense] = []
+        self.hard: list[Dense] = []
         self.box: list[tuple[Dense, Dense]] = []
         self.problems, self.size = [], plain.size
         for instance in inputs:
@@ -73,8 +75,18 @@ class Peers:
                     np.full(len(upper), -1e30),
                 )
             )  # fmt: skip
+            self.hard.append(_hard(plain))
             self.problems.append(_copy(qp))
             self.box.append((_box(plain, 0), _box(plain, 1)))
+
+
+def _hard(plain: Plain) -> Dense:
+    keep, qp, jerks = plain.real, plain.qp, slice(2 * plain.config.samples)
+    upper = qp.upper[keep].copy()
+    return Dense(
+        np.ascontiguousarray(qp.hessian[jerks, jerks]), qp.gradient[jerks].copy(),
+        np.ascontiguousarray(qp.matrix[keep, jerks]), upper, np.full(len(upper), -1e30),
+    )  # fmt: skip
 
 
 def _box(plain: Plain, axis: int) -> Dense:
@@ -102,6 +114,7 @@ def contestants(inputs: list[PreviewInputs], peers: Peers, config: PreviewConfig
     count, ours = len(inputs), PreviewController(config)
     return {
         "daqp refactoring, plain": lambda k: peers.plain[k % count].solve(),
+        "daqp refactoring, hard": lambda k: peers.hard[k % count].solve(),
         "daqp refactoring, box, two axes": lambda k: [axis.solve() for axis in peers.box[k % count]],
         "ours, whole step": lambda k: ours.step(inputs[k % count], DT),
     }
@@ -115,6 +128,15 @@ def slow_contestants(peers: Peers) -> dict[str, object]:
         solver = make_solver(name, peers.size, options)
         found[f"{name}, plain"] = lambda k, solver=solver: solver.solve(peers.problems[k % count])
     return found
+
+
+def unsolved(peers: Peers) -> dict[str, float]:
+    """Share of the instances that daqp has no answer to."""
+    return {
+        "plain_unsolved": float(np.mean([problem.solve() != 1 for problem in peers.plain])),
+        "hard_unsolved": float(np.mean([problem.solve() != 1 for problem in peers.hard])),
+        "box_unsolved": float(np.mean([any(axis.solve() != 1 for axis in pair) for pair in peers.box])),
+    }
 
 
 def solver_share(inputs: list[PreviewInputs], config: PreviewConfig) -> float:
