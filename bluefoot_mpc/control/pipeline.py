@@ -189,11 +189,12 @@ class Pipeline:
         if motion.yaw_rate == 0.0 and not any(motion.velocity.tolist()):
             self._tracking = tracking.rest(self._tracking)
             return wanted
-        velocity = upright @ estimate.linear_velocity
+        # The trunk sways over its feet: only what it was not told to do is an error.
+        velocity = (upright @ estimate.linear_velocity)[:2] - self._trunk.velocity
         # The virtual robot's heading: the trunk's, less the yaw that it was told to have over the feet.
         heading = float(estimate.rpy[2]) - self._trunk.yaw
         self._tracking, twist = tracking.advance(
-            self._tracking, wanted, velocity[:2], heading, self.period, self.config.tracking
+            self._tracking, wanted, velocity, heading, self.period, self.config.tracking
         )
         return twist
 

@@ -44,6 +44,7 @@ class TrunkPlanner:
     Attributes:
         position: (3,) m, the trunk origin that was last wanted, in b'.
         yaw: rad, the trunk's commanded yaw in b'.
+        velocity: (2,) m/s, how the wanted trunk origin moves in b' (sway and commanded offset).
         tilt_rate: (2,) rad/s, commanded angular velocity about x and y of b'.
 
     Args:
@@ -77,6 +78,7 @@ class TrunkPlanner:
         self._held = False
         self.position = self.over_stance(self._pose).trunk_position
         self.yaw = 0.0
+        self.velocity = np.zeros(2)
         self.tilt_rate = np.zeros(2)
 
     @property
@@ -112,6 +114,7 @@ class TrunkPlanner:
         self._tell_sway(moved=self._pose is not before)
         self.tilt_rate = _tilt_rate(before, self._pose, dt)
         reference = self._reference(gait, self._pose, height)
+        self.velocity = (reference.trunk_position - self.position)[:2] / dt
         self.position, self.yaw = reference.trunk_position, float(self._pose[5])
         return reference, zmp, events
 

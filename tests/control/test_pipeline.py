@@ -11,6 +11,7 @@ from bluefoot_mpc.control.posture import PostureConfig
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.model.robot import load_robot
 from bluefoot_mpc.types import BodyState, Mode, SafetyLevel, SafetyRequest
+from bluefoot_mpc.zmp.placement import PlacementConfig
 from tests.control.closed_loop import mode, walk
 from tests.io.test_safety import make_frame
 
@@ -20,6 +21,9 @@ DT = 0.02
 @pytest.fixture(scope="module")
 def model():
     return load_robot()
+
+
+STILL = PlacementConfig(enabled=False)
 
 
 class Bench:
@@ -62,13 +66,27 @@ def bench(model, monkeypatch):
     return made
 
 
+def test_the_sway_is_no_error_of_speed(model, monkeypatch):
+    bench = Bench(model, monkeypatch)
+    bench.run(1.2, mode(Mode.STAND))
+    planner = bench.pipeline._trunk
+    bench.run(DT, walk(0.05, gait="walk"), linear_velocity=[0.0, 0.0, 0.0])
+    for _ in range(200):
+        measured = [0.05 + planner.velocity[0], planner.velocity[1], 0.0]
+        bench.run(DT, walk(0.05, gait="walk"), linear_velocity=measured)
+    sway = np.ptp([inputs.velocity for inputs in bench.inputs[-150:]], axis=0)
+    np.testing.assert_allclose(sway, 0.0, atol=1e-9)
+
+
 def test_it_stands_up_before_it_walks(model, monkeypatch):
     bench = Bench(model, monkeypatch)
     assert bench.run(0.98, walk(0.06)).telemetry.mode is Mode.STAND
     assert bench.run(0.06, walk(0.06)).telemetry.mode is Mode.WALK
 
 
-def test_odometry_is_turned_by_tilt_and_by_the_trunks_yaw(bench):
+def test_odometry_is_turned_by_tilt_and_by_the_trunks_yaw(model, monkeypatch):
+    bench = Bench(model, monkeypatch, zmp=STILL)
+    bench.run(1.2, mode(Mode.STAND))
     looking_left = replace(mode(Mode.STAND), trunk=walk(rpy=[0.0, 0.0, 0.3]).trunk)
     bench.run(1.0, looking_left, rpy=[0.0, 0.0, 0.3])
     c, s, ct, st = np.cos(0.3), np.sin(0.3), np.cos(0.2), np.sin(0.2)
