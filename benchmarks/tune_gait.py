@@ -15,11 +15,13 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import optuna
 
+from bluefoot_mpc.gait.table import NAMES
 from bluefoot_mpc.scenarios.options import CONTROLLERS
-from bluefoot_mpc.settings import dump_toml, merge, parse_override
+from bluefoot_mpc.settings import dump_toml, parse_override
 from bluefoot_mpc.tuning.cases import walking_case
 from bluefoot_mpc.tuning.path import Candidate, gait_table, smooth_path
 from bluefoot_mpc.tuning.space import SPACES, Space
@@ -44,6 +46,14 @@ def search(args: argparse.Namespace, space: Space) -> dict[float, list[Candidate
     return found
 
 
+def last_level(override: str) -> list[tuple[str, Any]]:
+    """Keys and values of an override's innermost table."""
+    table: Any = parse_override(override)
+    while all(isinstance(value, dict) for value in table.values()):
+        (table,) = table.values()
+    return list(table.items())
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -61,11 +71,11 @@ def main() -> None:
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     space = SPACES[args.gait](feed_forward=not args.plain)
     path = smooth_path(search(args, space), space, args.smoothness)
-    table: dict[str, object] = {}
-    for text in space.fixed:
-        table = merge(table, parse_override(text))
     knots = {speed: candidate.values for speed, candidate in path.items()}
-    table = merge(table, {"control": {"gait": {f"{args.gait}_table": gait_table(knots)}}})
+    # The names of the swing law hold at every knot.
+    words = {key: value for text in space.fixed for key, value in last_level(text) if key in NAMES}
+    columns = {**gait_table(knots), **words}
+    table = {"control": {"gait": {f"{args.gait}_table": columns}}}
     args.out.parent.mkdir(parents=True, exist_ok=True)
     args.out.write_text(dump_toml(table), encoding="utf-8")
     print(f"wrote {args.out}")

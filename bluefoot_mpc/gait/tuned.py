@@ -29,3 +29,12 @@ TROT = GaitTable(
     back_emf=(0.4, 0.4, 0.3, 0.25, 0.2, 0.1, 0.0),
 )
 """The trot of the model-based controller."""
+
+WALK = GaitTable(
+    speed=(0.03, 0.06),
+    cycle_time=(1.6, 1.12),
+    step_height=(0.013,),
+    mixing=(0.9,),
+    back_emf=(0.5,),
+)
+"""The walk of the model-based controller; what is not here follows the gait's own laws."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.gait.table import BOUNDS
 
 Values = dict[str, float]
 """Values of a point in the space, by name of the parameter."""
@@ -21,6 +23,7 @@ class Parameter:
         low: smallest value, in the settings' unit.
         high: largest value.
         step: distance of neighbouring values, counted from `low`; None varies freely.
+        listed: True where the settings are lists, which get the value as their one entry.
     """
 
     name: str
@@ -28,6 +31,7 @@ class Parameter:
     low: float
     high: float
     step: float | None = None
+    listed: bool = False
 
     def __post_init__(self) -> None:
         """Check the range."""
@@ -88,7 +92,8 @@ class Space:
     def overrides(self, values: Mapping[str, float]) -> tuple[str, ...]:
         """Settings of a point as overrides for a run, the fixed ones first."""
         point = self.checked(values)
-        varied = (f"{key}={point[p.name]!r}" for p in self.parameters for key in p.keys)
+        texts = {p.name: f"[{point[p.name]!r}]" if p.listed else repr(point[p.name]) for p in self.parameters}
+        varied = (f"{key}={texts[p.name]}" for p in self.parameters for key in p.keys)
         return (*self.fixed, *varied)
 
 
@@ -101,44 +106,50 @@ frequency, up to twice as much.
 """
 
 
-def _cycle(gait: str, low: float, high: float, turns: int) -> Parameter:
-    keys = tuple(f"control.gait.{gait}.cycle_{bound}" for bound in ("min", "max"))
-    return Parameter(name="cycle_time", keys=keys, low=low, high=high, step=turns * TICK)
+class _Range(NamedTuple):
+    """Range of a column of the gait's table; `turns` (in one cycle) keeps it to whole ticks for each."""
 
-
-def _gait(gait: str, name: str, low: float, high: float, key: str) -> Parameter:
-    return Parameter(name=name, keys=(f"control.gait.{gait}.{key}",), low=low, high=high)
-
-
-def _control(name: str, low: float, high: float, key: str) -> Parameter:
-    return Parameter(name=name, keys=(f"control.{key}",), low=low, high=high)
+    name: str
+    low: float
+    high: float
+    turns: int = 0
 
 
 _POSTURE = (
-    _control("trunk_height", 0.085, 0.14, "posture.trunk_height"),
-    _control("stance_x", 0.11, 0.18, "posture.stance_x"),
-    _control("stance_y", 0.13, 0.20, "posture.stance_y"),
-    _control("trunk_forward", -0.012, 0.012, "posture.trunk_forward"),
+    _Range("stance_x", 0.11, 0.18),
+    _Range("stance_y", 0.13, 0.20),
+    _Range("trunk_height", 0.085, 0.14),
+    _Range("trunk_forward", -0.012, 0.012),
 )
 _FEED_FORWARD = (
-    _control("level_gain", 0.1, 0.8, "posture.level_gain"),
-    _control("mixing", 0.0, 0.8, "servo.mixing"),
-    _control("back_emf", 0.0, 1.0, "servo.back_emf"),
+    _Range("level_gain", 0.1, 0.8),
+    _Range("mixing", 0.0, 0.9),
+    _Range("back_emf", 0.0, 1.0),
 )
 _SWING = {
-    "minimum_jerk": (
-        _control("ground_matching", -1.0, 1.0, "gait.foothold.ground_matching"),
-        _control("apex", 0.35, 0.75, "gait.foothold.apex"),
-    ),
-    "virtual_force": (_control("swing_rate", 4.0, 14.0, "gait.foothold.swing_rate"),),
+    "minimum_jerk": (_Range("ground_matching", -1.0, 1.0), _Range("apex", 0.35, 0.75)),
+    "virtual_force": (_Range("swing_rate", 4.0, 14.0),),
 }
 _VERTICAL = {"minimum_jerk": "quintic", "virtual_force": "sine"}
+_TIMING = {
+    "trot": (
+        _Range("cycle_time", 0.2, 0.52, 2),
+        _Range("swing_share", 0.2, 0.5),
+        _Range("step_height", 0.010, 0.035),
+    ),
+    "walk": (
+        _Range("cycle_time", 0.72, 2.0, 4),
+        _Range("swing_share", 0.12, 0.25),
+        _Range("step_height", 0.010, 0.03),
+    ),
+}
 
 
 def trot_space(law: str = "virtual_force", *, feed_forward: bool = True) -> Space:
     """Timing, lift, stance and swing shape of a trot at one speed.
 
-    Parameters that the gait's table knows have the name of its column.
+    Everything is a column of the gait's table, which gets one knot: what the
+    table held before has no effect.
 
     Args:
         law: how feet swing, ``minimum_jerk`` (lifted by quintics) or ``virtual_force`` (by the oscillator).
@@ -147,16 +158,11 @@ def trot_space(law: str = "virtual_force", *, feed_forward: bool = True) -> Spac
     Raises:
         UnknownNameError: there is no such law.
     """
-    timing = (
-        _cycle("trot", 0.2, 0.52, 2),
-        _gait("trot", "swing_share", 0.2, 0.5, "swing_share"),
-        _gait("trot", "step_height", 0.010, 0.035, "height_min"),
-    )
-    return _space("trot", law, timing, feed_forward)
+    return _space("trot", law, feed_forward)
 
 
 def walk_space(law: str = "virtual_force", *, feed_forward: bool = True) -> Space:
-    """Timing, lift, stance and sway of a walk at one speed.
+    """The same for a walk.
 
     Args:
         law: as for `trot_space`.
@@ -165,27 +171,29 @@ def walk_space(law: str = "virtual_force", *, feed_forward: bool = True) -> Spac
     Raises:
         UnknownNameError: there is no such law.
     """
-    timing = (
-        _cycle("walk", 0.72, 2.0, 4),
-        _gait("walk", "swing_share", 0.12, 0.25, "swing_share"),
-        _gait("walk", "step_height", 0.012, 0.03, "height_min"),
-        _control("zmp_lead", 0.05, 0.4, "zmp.lead"),
-        _control("zmp_gain", 1.0, 8.0, "zmp.gain"),
-        _control("zmp_offset", 0.01, 0.04, "zmp.max_offset"),
-    )
-    return _space("walk", law, timing, feed_forward)
+    return _space("walk", law, feed_forward)
 
 
-def _space(gait: str, law: str, timing: tuple[Parameter, ...], feed_forward: bool) -> Space:
+def _space(gait: str, law: str, feed_forward: bool) -> Space:
     if law not in _SWING:
         raise UnknownNameError("swing law", law, _SWING)
+    table = f"control.gait.{gait}_table"
+    ranges = (*_TIMING[gait], *_POSTURE, *_SWING[law], *(_FEED_FORWARD if feed_forward else ()))
+    names = {column.name for column in ranges}
     fixed = (
-        f"control.gait.foothold.law={law}",
-        f"control.gait.foothold.vertical={_VERTICAL[law]}",
-        f"control.gait.{gait}.height_v=0.0",
+        f"{table}.speed=[0.0]",
+        f'{table}.law=["{law}"]',
+        f'{table}.vertical=["{_VERTICAL[law]}"]',
+        *(f"{table}.{name}=[]" for name in BOUNDS if name not in names),
     )
-    more = _FEED_FORWARD if feed_forward else ()
-    return Space(parameters=(*timing, *_POSTURE, *_SWING[law], *more), fixed=fixed)
+    parameters = tuple(
+        Parameter(
+            name=name, keys=(f"{table}.{name}",), low=low, high=high,
+            step=turns * TICK if turns else None, listed=True,
+        )
+        for name, low, high, turns in ranges
+    )  # fmt: skip
+    return Space(parameters=parameters, fixed=fixed)
 
 
 SPACES = {"trot": trot_space, "walk": walk_space}

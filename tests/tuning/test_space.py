@@ -1,8 +1,10 @@
 import pytest
 
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.gait.table import BOUNDS
 from bluefoot_mpc.scenarios import RunOptions
 from bluefoot_mpc.scenarios.config import resolve
+from bluefoot_mpc.scenarios.options import CONTROLLERS
 from bluefoot_mpc.scenarios.registry import find_scenario
 from bluefoot_mpc.tuning.space import SPACES, Parameter, Space, trot_space
 
@@ -20,6 +22,11 @@ def test_overrides_of_a_point_set_every_key_after_the_fixed_ones():
         "control.gait.trot.cycle_min=0.3",
         "control.gait.trot.cycle_max=0.3",
     )
+
+
+def test_settings_that_are_lists_get_one_entry():
+    column = Parameter(name="a", keys=("x.a",), low=0.0, high=1.0, listed=True)
+    assert Space(parameters=(column,)).overrides({"a": 0.5}) == ("x.a=[0.5]",)
 
 
 def test_values_are_cut_to_their_ranges():
@@ -54,14 +61,16 @@ def test_impossible_spaces_are_refused(make):
         make()
 
 
+@pytest.mark.parametrize("controller", CONTROLLERS)
 @pytest.mark.parametrize("gait", sorted(SPACES))
 @pytest.mark.parametrize("law", ["minimum_jerk", "virtual_force"])
 @pytest.mark.parametrize("corner", ["low", "high"])
-def test_shipped_spaces_name_settings_that_exist_and_stay_inside_their_limits(gait, law, corner):
+def test_a_point_of_a_shipped_space_is_what_the_gait_gets(controller, gait, law, corner):
     space = SPACES[gait](law)
     values = {p.name: getattr(p, corner) for p in space.parameters}
-    resolved = resolve(find_scenario("walk"), RunOptions(overrides=space.overrides(values)))
-    control = resolved.stages.control
-    assert control.gait.foothold.law == law
-    assert control.gait.timing(gait).cycle_min == control.gait.timing(gait).cycle_max == values["cycle_time"]
-    assert control.posture.stance_x == values["stance_x"]
+    options = RunOptions(controller=controller, overrides=space.overrides(values))
+    table = resolve(find_scenario("walk"), options).stages.control.gait.table(gait)
+    assert table.speed == (0.0,)
+    assert table.law == (law,)
+    for name in BOUNDS:
+        assert getattr(table, name) == ((values[name],) if name in values else ())
