@@ -1,6 +1,7 @@
 """Time of the whole stack against the same physics steps alone.
 
-    python benchmarks/physics_share.py [--duration 20] [--gait trot] [--speed 0.06] [--json]
+    python benchmarks/physics_share.py [--duration 20] [--controller mpc] [--gait trot] [--speed 0.06]
+        [--json]
 
 A walk runs as ``bluefoot run`` runs it, without a report. Three times, because
 "the whole stack" can be read in three ways: controller, supervisor, simulated
@@ -30,6 +31,7 @@ import mujoco
 import numpy as np
 
 from bluefoot_mpc.control.pipeline import Pipeline
+from bluefoot_mpc.control.presets import CONTROLLERS
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.loop import LoopHooks, run_loop
 from bluefoot_mpc.runtime.recorder import Recorder
@@ -257,12 +259,17 @@ def main():
     parser.add_argument("--scenario", default="walk")
     parser.add_argument("--duration", type=float, default=20.0, help="s")
     parser.add_argument("--gait", default=None)
+    parser.add_argument("--controller", choices=CONTROLLERS, default=None)
     parser.add_argument("--speed", type=float, default=None, help="m/s")
     parser.add_argument("--set", dest="overrides", action="append", default=[], help="section.key=value")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     chosen = RunOptions(
-        duration=options.duration, gait=options.gait, speed=options.speed, overrides=tuple(options.overrides)
+        duration=options.duration,
+        controller=options.controller,
+        gait=options.gait,
+        speed=options.speed,
+        overrides=tuple(options.overrides),
     )
     result = measure(resolve(find_scenario(options.scenario), chosen))
     if options.json:

@@ -8,6 +8,7 @@ dataclass's ``__post_init__`` with the ``require_*`` helpers below.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import math
 import tomllib
@@ -20,6 +21,12 @@ from typing import Any, TypeVar
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 
 T = TypeVar("T")
+
+
+@functools.cache
+def _type_hints(cls: Any) -> dict[str, Any]:
+    """Types of a dataclass's fields; to work them out takes longer than all else of `build`."""
+    return typing.get_type_hints(cls)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -51,7 +58,7 @@ def build(cls: type[T], table: Mapping[str, Any], where: str = "") -> T:
     Raises:
         ConfigurationError: a key is unknown or missing, a type does not fit, or a value is impossible.
     """
-    hints = typing.get_type_hints(cls)
+    hints = _type_hints(typing.cast("typing.Hashable", cls))
     fields = {f.name: f for f in dataclasses.fields(cls) if f.init}  # type: ignore[arg-type]
     for key in table:
         if key not in fields:

@@ -49,14 +49,14 @@ class Surroundings:
     """What else bears on the forces of a tick.
 
     Attributes:
-        feet: planned feet over the ground.
+        feet: planned feet over the ground; None where their acceleration has no share.
         slope: (2,) rise of the ground per metre along x and y of b'.
         voltage: V at the servos.
         derating: share of the torque that heat leaves.
         com: plan of the centre of mass; None without a preview.
     """
 
-    feet: FootMotion
+    feet: FootMotion | None
     slope: FloatArray
     voltage: float
     derating: float
@@ -99,7 +99,8 @@ class BodyPlanner:
         inputs = WholeBodyInputs(
             q=body.q, v=body.v, contact=~swing, com=self._no_com, trunk=body.q[3:7],
             com_acceleration=_com_acceleration(around.com), foot=gait.foot_position,
-            foot_acceleration=self._swing_share * around.feet.acceleration, posture=body.q[7:],
+            foot_acceleration=None if around.feet is None else self._swing_share * around.feet.acceleration,
+            posture=body.q[7:],
             remaining=_remaining(gait), ground=_normal(around.slope),
             voltage=around.voltage, derating=around.derating,
         )  # fmt: skip

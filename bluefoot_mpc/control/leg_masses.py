@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
+from bluefoot_mpc.codegen import compiled, made_once
 from bluefoot_mpc.geometry import rotation_from_rpy
-from bluefoot_mpc.model.legs import LegGeometry, joint_positions_in_base
+from bluefoot_mpc.model.legs import LegGeometry
 from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.types import FloatArray
-from bluefoot_mpc.zmp import placement
+from bluefoot_mpc.zmp.binding import Bound
 from bluefoot_mpc.zmp.mass_points import MassPoints, lump
+from bluefoot_mpc.zmp.placement import PlacementConfig
+from bluefoot_mpc.zmp.placement_symbols import com_function, placement_function
 
 
 class LegMasses:
@@ -15,6 +22,7 @@ class LegMasses:
 
     Attributes:
         masses: trunk, joints, links and feet.
+        rotation: (3, 3) rotation of the trunk as it is told, base to b'.
 
     Args:
         parameters: the robot.
@@ -22,25 +30,35 @@ class LegMasses:
 
     def __init__(self, parameters: RobotParameters) -> None:
         self.masses: MassPoints = lump(parameters)
-        self._geometry = LegGeometry.from_parameters(parameters)
-        self._rotation: FloatArray | None = None
+        self.rotation = np.eye(3)
+        geometry = self._geometry = LegGeometry.from_parameters(parameters)
+        self._content = (
+            geometry.links, geometry.hips, self.masses.trunk, self.masses.trunk_com.tobytes(),
+            self.masses.leg_weights.tobytes(),
+        )  # fmt: skip
+        function = made_once(lambda: compiled(com_function(geometry, self.masses)), "com", *self._content)
+        self._joints, self._com = np.zeros(16), np.zeros(3)
+        inputs, outputs = (self._joints, self.rotation), (self._com, np.zeros((4, 3)))
+        self._measure = Bound(function, inputs, outputs)
 
     def turn(self, rpy: FloatArray) -> None:
         """Take note of the trunk's commanded (3,) roll, pitch and yaw, rad."""
-        self._rotation = rotation_from_rpy(rpy) if rpy.any() else None
+        self.rotation[:] = rotation_from_rpy(rpy)
 
-    def points_and_com(self, joints: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(4, 5, 3) m, points of the legs, and (3,) m, centre of mass, from the trunk in axes of b'.
+    def com(self, joints: FloatArray) -> FloatArray:
+        """(3,) m, centre of mass from the trunk in axes of b'.
 
         Args:
             joints: (16,) rad.
         """
-        points = joint_positions_in_base(self._geometry, joints)
-        trunk_com = self.masses.trunk_com
-        if self._rotation is not None:
-            points, trunk_com = points @ self._rotation.T, self._rotation @ trunk_com
-        return points, placement.centre_of_mass(self.masses, trunk_com, points)
+        self._joints[:] = joints
+        self._measure.call()
+        return self._com.copy()
 
-    def com(self, joints: FloatArray) -> FloatArray:
-        """(3,) m, centre of mass from the trunk in axes of b'."""
-        return self.points_and_com(joints)[1]
+    def placement(self, config: PlacementConfig) -> Any:
+        """The placement law on these masses as a function: see `placement_function`."""
+        geometry, masses = self._geometry, self.masses
+        return made_once(
+            lambda: compiled(placement_function(geometry, masses, config)),
+            "placement", *self._content, config,
+        )  # fmt: skip

@@ -225,8 +225,9 @@ class Pipeline:
         self._body.step(gait, reference, joints, self.period)
         if not self.config.whole_body.enabled or not self._targets.started:
             return None
+        feet = self._gait.feet_ahead() if self.config.whole_body.swing_acceleration > 0.0 else None
         around = Surroundings(
-            feet=self._gait.feet_ahead(), slope=self._ground.slope, voltage=self._voltage(frame),
+            feet=feet, slope=self._ground.slope, voltage=self._voltage(frame),
             derating=float(servo_map.derating(frame.joint_temperature, self.config.servo).min()),
             com=self._trunk.plan,
         )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 from bluefoot_mpc.control.leg_masses import LegMasses
 from bluefoot_mpc.gait.gait import GaitOutput
 from bluefoot_mpc.types import BoolArray, FloatArray
-from bluefoot_mpc.zmp import placement
+from bluefoot_mpc.zmp.binding import Bound
 from bluefoot_mpc.zmp.placement import PlacementConfig
 
 
@@ -41,6 +41,14 @@ class Sway:
         self._joints_in_stance = joints_in_stance
         self._masses.turn(np.zeros(3))
         self._neutral_com = self._masses.com(joints_in_stance(np.zeros(6)))
+        self._joints, self._feet, self._trunk = np.zeros(16), np.zeros((4, 3)), np.zeros(3)
+        self._swing, self._before, self._taken = np.zeros(4), np.zeros(2), np.zeros(2)
+        self._dt, self._placed, self._zmp = np.zeros(1), np.zeros(2), np.zeros(2)
+        inputs = (
+            self._joints, masses.rotation, self._feet, self._trunk, self._swing, self._before, self._taken,
+            self._dt,
+        )  # fmt: skip
+        self._law = Bound(masses.placement(config), inputs, (self._placed, self._zmp))
         self.reset()
 
     def reset(self) -> None:
@@ -64,16 +72,15 @@ class Sway:
             trunk: (3,) m, wanted trunk origin in b'.
             dt: s.
         """
-        config = self._config
-        if not config.enabled:
+        if not self._config.enabled:
             return np.full(2, np.nan)
         # The law is quasi-static, and tilts that nobody commanded are small.
-        points, com = self._masses.points_and_com(joints)
-        zmp = placement.static_zmp(self._masses.masses, com, points, self._swing_ahead(gait))
-        force = placement.boundary_force(trunk, gait.foot_position, config)
-        target = zmp + self.offset - self._commanded
-        self.offset = placement.advance(self.offset, target, force, self._masses.masses, dt, config)
-        return trunk[:2] + zmp
+        self._joints[:], self._feet[:], self._trunk[:] = joints, gait.foot_position, trunk
+        self._swing[:] = self._swing_ahead(gait)
+        self._before[:], self._taken[:], self._dt[0] = self.offset, self._commanded, dt
+        self._law.call()
+        self.offset = self._placed.copy()
+        return trunk[:2] + self._zmp
 
     def _swing_ahead(self, gait: GaitOutput) -> BoolArray:
         """(4,) True where a leg will swing after the law's lead time, at the present rhythm."""

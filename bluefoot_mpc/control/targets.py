@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from bluefoot_mpc.control.quick_inverse import QuickInverse
 from bluefoot_mpc.geometry import rotation_from_rpy
 from bluefoot_mpc.model.legs import (
     AnkleConfig,
@@ -33,6 +34,7 @@ class JointTargets:
         self._geometry = geometry
         self._ankle = ankle
         self._table = AnkleTable(geometry) if ankle.policy == "margin" else None
+        self._quick = QuickInverse(geometry, self._table) if self._table is not None else None
         self.reset()
 
     def reset(self) -> None:
@@ -54,7 +56,7 @@ class JointTargets:
             ankle_shift: rad, added to the ankle direction that the policy gives.
         """
         rotation = rotation_from_rpy(reference.trunk_rpy)
-        feet = (reference.foot_position - reference.trunk_position) @ rotation
+        feet = _feet_in_base(reference, rotation)
         gamma = ankle_directions(self._geometry, self._ankle, feet, rotation[2], table=self._table)
         return inverse(self._geometry, feet, gamma + ankle_shift if ankle_shift else gamma)
 
@@ -69,17 +71,36 @@ class JointTargets:
             dt: s.
             ankle_shift: rad, added to the ankle direction that the policy gives.
         """
-        result = self.reach(reference, ankle_shift)
-        # Two ufuncs: np.clip takes three times as long on a few numbers.
-        goal = np.minimum(np.maximum(result.joints, self._geometry.lower), self._geometry.upper)
-        beyond = frozenset(violation.index for violation in result.violations)
-        new, self._beyond = beyond - self._beyond, beyond
-        events = tuple(v.describe() for v in result.violations if v.index in new)
+        goal = self._quickly(reference, ankle_shift)
+        events: tuple[str, ...] = ()
+        if goal is None:
+            goal, events = self._thoroughly(reference, ankle_shift)
+        else:
+            self._beyond = frozenset()
         if self._found is None:
             # A servo that did not answer is taken to be where it is wanted.
             known = frame.joint_valid & np.isfinite(frame.joint_position)
             self._found = np.where(known, frame.joint_position, goal)
         return self._soften(goal, self._found, dt), events
+
+    def _quickly(self, reference: PostureReference, ankle_shift: float) -> FloatArray | None:
+        """(16,) rad by generated code; None where a foot or limit needs a closer look."""
+        if self._quick is None:
+            return None
+        return self._quick.joints(
+            _feet_in_base(reference, rotation_from_rpy(reference.trunk_rpy)), ankle_shift
+        )
+
+    def _thoroughly(
+        self, reference: PostureReference, ankle_shift: float
+    ) -> tuple[FloatArray, tuple[str, ...]]:
+        """(16,) rad inside the limits, and which of them began to cut on this tick."""
+        result = self.reach(reference, ankle_shift)
+        # Two ufuncs: np.clip takes three times as long on a few numbers.
+        goal = np.minimum(np.maximum(result.joints, self._geometry.lower), self._geometry.upper)
+        beyond = frozenset(violation.index for violation in result.violations)
+        new, self._beyond = beyond - self._beyond, beyond
+        return goal, tuple(v.describe() for v in result.violations if v.index in new)
 
     def _soften(self, goal: FloatArray, found: FloatArray, dt: float) -> FloatArray:
         self._elapsed += dt
@@ -87,3 +108,8 @@ class JointTargets:
             return goal
         share = 0.5 - 0.5 * math.cos(math.pi * self._elapsed / START_TIME)
         return found + share * (goal - found)
+
+
+def _feet_in_base(reference: PostureReference, rotation: FloatArray) -> FloatArray:
+    """(4, 3) m, wanted feet in the frame of the wanted trunk."""
+    return (reference.foot_position - reference.trunk_position) @ rotation

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from bluefoot_mpc.codegen import made_once
 from bluefoot_mpc.estimation import symbols
 from bluefoot_mpc.estimation.config import ContactConfig, EstimatorConfig
 from bluefoot_mpc.estimation.filter import SIZE, VALUES, FilterState, frame_noise, transition
@@ -53,7 +54,8 @@ class Predictor:
     """
 
     def __init__(self, geometry: LegGeometry, config: EstimatorConfig) -> None:
-        self._work = Workspace(_prediction(geometry, config))
+        legs = (geometry.links, geometry.hips, geometry.foot_radius)
+        self._work = Workspace(made_once(lambda: _prediction(geometry, config), "prediction", legs, config))
         self._half = np.zeros((SIZE + 3, SIZE))
         ahead, steps, self._diagonal, scene, noise, self._moved = self._work.outputs
         self._ahead, self._steps = ahead, steps.T

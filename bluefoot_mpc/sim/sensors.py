@@ -20,6 +20,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from bluefoot_mpc.codegen import compiled, made_once
 from bluefoot_mpc.model.parameters import ServoParameters
 from bluefoot_mpc.model.servo import SPEED_UNIT
 from bluefoot_mpc.sim.config import SensorConfig
@@ -87,7 +88,10 @@ class Sensors:
         self._clock = np.zeros(3)
         self._before = np.zeros(N_JOINTS)
         self._field = np.zeros((self._rows, 3))
-        function = sensor_function(config, servo, probe)
+        rates = (len(probe.means), probe.physics_period, probe.frame_steps, probe.window_steps)
+        function: Any = made_once(
+            lambda: compiled(sensor_function(config, servo, probe)), "sensors", config, servo, rates
+        )
         self._noise = np.zeros(function.size1_in(3))
         self._reports = function.size1_out(0)
         ends = [2 * self._rows + k * N_JOINTS for k in range(6)]

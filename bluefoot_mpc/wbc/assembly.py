@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg.lapack import dposv
 
-from bluefoot_mpc.codegen import CodegenConfig, compiled
+from bluefoot_mpc.codegen import CodegenConfig, compiled, made_once
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.qp import QpProblem
 from bluefoot_mpc.types import BoolArray, FloatArray
@@ -74,15 +74,16 @@ class Assembly:
         self._default["ground"][2] = 1.0
         self._allocate()
         self._configure()
-        build, every = CodegenConfig(enabled=config.codegen), np.ones(len(model.feet), dtype=np.bool_)
+        every = np.ones(len(model.feet), dtype=np.bool_)
         self._stances = {every.tobytes(): self._new_stance(every)}
         outputs = [
             self._rows[: self._written], self._side, self._base, self._lower[: model.joints],
             self._upper[: model.joints], self._bounds, self._loaded,
         ]  # fmt: skip
-        self._assemble = Buffers(compiled(assembly_function(model), build), [self.parameters], outputs)
+        assemble, evaluate = _functions(model, config.codegen)
+        self._assemble = Buffers(assemble, [self.parameters], outputs)
         inputs = [self.parameters, self._x, self._acceleration, self._bounds]
-        self._evaluate = Buffers(compiled(plan_function(model), build), inputs, [self.flat_plan])
+        self._evaluate = Buffers(evaluate, inputs, [self.flat_plan])
         self.reset()
 
     def reset(self) -> None:
@@ -228,3 +229,16 @@ class Assembly:
         given.upper[:] = np.minimum(actuators.upper - config.joint_margin, _NO_LIMIT)
         given.braking[:] = config.joint_acceleration
         given.friction[:] = config.friction
+
+
+def _functions(model: WholeBodyModel, codegen: bool) -> tuple[Any, Any]:
+    """Assembly and plan of a robot, built once per process and robot."""
+    build = CodegenConfig(enabled=codegen)
+
+    def make() -> tuple[Any, Any]:
+        return compiled(assembly_function(model), build), compiled(plan_function(model), build)
+
+    actuators = model.actuators
+    shape = (model.frames, actuators.armature.tobytes(), model.mass, model.weight, model.size)
+    functions: tuple[Any, Any] = made_once(make, "whole body", codegen, model.pin_model.saveToString(), shape)
+    return functions

@@ -17,6 +17,9 @@ from bluefoot_mpc.settings import require_nonnegative, require_positive
 from bluefoot_mpc.types import BoolArray, FloatArray
 from bluefoot_mpc.zmp.mass_points import MassPoints
 
+FURTHEST = 5.0
+"""Cap of the boundary force's exponents: far outside, the direction matters and not the size."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class PlacementConfig:
@@ -89,9 +92,8 @@ def boundary_force(trunk: FloatArray, feet: FloatArray, config: PlacementConfig)
     force_x = force_y = 0.0
     for x, y, z in (feet - trunk).tolist():
         distance = math.sqrt(x * x + y * y + z * z)
-        # Exponents are capped: far outside, the direction matters and not the size.
-        pull = math.exp(min(sharpness * (distance - config.reach_max), 5.0))
-        push = math.exp(min(sharpness * (config.reach_min - distance), 5.0))
+        pull = math.exp(min(sharpness * (distance - config.reach_max), FURTHEST))
+        push = math.exp(min(sharpness * (config.reach_min - distance), FURTHEST))
         share = (pull - push) / distance
         force_x += share * x
         force_y += share * y

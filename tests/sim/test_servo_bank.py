@@ -186,8 +186,9 @@ def test_states_updated_in_place_equal_those_of_the_function():
         )
         before = [bank.profile.copy(), bank.play.copy(), bank.voltage.copy(), bank._sums.copy()]
         expected = bank._function(
-            bench.data.qpos, bench.data.qvel, bank.goal, bank._ramp, bank._limit, bank._live, *before
-        )
+            bench.data.qpos, bench.data.qvel, bank.goal, bank._ramp, bank._limit, bank._live,
+            bank._slope, bank._friction_scale, bank._open_voltage, *before,
+        )  # fmt: skip
         bank.advance()
         found = (bench.data.ctrl, bench.model.dof_frictionloss, bank.duty, bank.torque)
         for want, got in zip(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,9 @@ from bluefoot_mpc.types import FloatArray
 CELLS = 100
 """Cells of an `AnkleTable` along the length of a stretched leg: 2 mm each."""
 _FROM_REACH, _FROM_HEIGHT = -0.15, -1.0
-_ROWS, _COLUMNS = round((1.0 - _FROM_REACH) * CELLS), round((0.1 - _FROM_HEIGHT) * CELLS)
+SHAPE = (round((1.0 - _FROM_REACH) * CELLS), round((0.1 - _FROM_HEIGHT) * CELLS))
+"""Cells outward and upward."""
+_ROWS, _COLUMNS = SHAPE
 _MAX_BEND = math.radians(1.0)
 """Largest second difference around a cell: keeps the error below a third of it."""
 
@@ -38,7 +41,6 @@ class AnkleTable:
     def __init__(self, geometry: LegGeometry) -> None:
         self._geometry = geometry
         links, bounds = geometry.links, geometry.bounds
-        self._length = sum(links[1:])
         self._cells = [_cells(links, bounds[4 * leg + 1 : 4 * leg + 4]) for leg in ALL_LEGS]
 
     def directions(self, feet_in_base: FloatArray, legs: Sequence[int] = ALL_LEGS) -> FloatArray:
@@ -51,12 +53,10 @@ class AnkleTable:
         Returns:
             (n,) rad.
         """
-        inner, scale = self._geometry.links[0], CELLS / self._length
         values = []
         for leg, (x, y, z) in zip(legs, feet_in_base.tolist(), strict=True):
             hip = self._geometry.hips[leg]
-            row = scale * (math.hypot(x - hip.x, y - hip.y) - inner) - _FROM_REACH * CELLS
-            column = scale * (z - hip.z) - _FROM_HEIGHT * CELLS
+            row, column = coordinates(self._geometry, math.hypot(x - hip.x, y - hip.y), z - hip.z)
             cell = None
             if 0.0 <= row < _ROWS and 0.0 <= column < _COLUMNS:
                 i, j = int(row), int(column)
@@ -69,9 +69,32 @@ class AnkleTable:
                 values.append(corner + row * (outward + twist * column) + upward * column)
         return np.array(values)
 
+    @property
+    def grid(self) -> FloatArray:
+        """(4 n + 1, 4) rad, read-only: the n cells of each leg, one leg after the other.
+
+        A corner's direction and its slopes; NaN where it bends, and in a last row
+        for all that lies outside.
+        """
+        links, bounds = self._geometry.links, self._geometry.bounds
+        return _grid(links, tuple(bounds[4 * leg + 1 : 4 * leg + 4] for leg in ALL_LEGS))
+
     def _search(self, leg: int, x: float, y: float, z: float) -> float:
         point = to_leg_frame(self._geometry, np.array([[x, y, z]]), (leg,))
         return float(widest_directions(self._geometry, point, (leg,))[0])
+
+
+def coordinates(geometry: LegGeometry, distance: Any, rise: Any) -> tuple[Any, Any]:
+    """Place in a table, in cells outward and upward, of numbers or symbols.
+
+    Args:
+        geometry: lengths.
+        distance: m, horizontal, of the foot from the hip_yaw axis.
+        rise: m, of the foot above the hip.
+    """
+    scale = CELLS / sum(geometry.links[1:])
+    row = scale * (distance - geometry.links[0]) - _FROM_REACH * CELLS
+    return row, scale * rise - _FROM_HEIGHT * CELLS
 
 
 @lru_cache(maxsize=16)
@@ -99,6 +122,17 @@ def _cells(
     smooth = (_bend(nodes) < _MAX_BEND).ravel().tolist()
     cells = zip(*(part.ravel().tolist() for part in (corner, outward, upward, twist)), strict=True)
     return [cell if good else None for cell, good in zip(cells, smooth, strict=True)]
+
+
+@lru_cache(maxsize=4)
+def _grid(
+    links: tuple[float, float, float, float], legs: tuple[tuple[tuple[float, float], ...], ...]
+) -> FloatArray:
+    unknown = (math.nan,) * 4
+    rows = [cell or unknown for bounds in legs for cell in _cells(links, bounds)]
+    grid = np.array([*rows, unknown])
+    grid.flags.writeable = False
+    return grid
 
 
 def _bend(nodes: FloatArray) -> FloatArray:
