@@ -75,7 +75,9 @@ def rotation_from_quaternion(quaternion: FloatArray) -> FloatArray:
 
 def quaternion_from_rpy(rpy: FloatArray) -> FloatArray:
     """(4,) quaternion ``x, y, z, w`` of roll, pitch, yaw (rad)."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(0.5 * rpy), np.sin(0.5 * rpy)
+    roll, pitch, yaw = (0.5 * rpy).tolist()
+    cr, cp, cy = math.cos(roll), math.cos(pitch), math.cos(yaw)
+    sr, sp, sy = math.sin(roll), math.sin(pitch), math.sin(yaw)
     return np.array(
         [
             sr * cp * cy - cr * sp * sy,

@@ -228,7 +228,7 @@ class Pipeline:
         feet = self._gait.feet_ahead() if self.config.whole_body.swing_acceleration > 0.0 else None
         around = Surroundings(
             feet=feet, slope=self._ground.slope, voltage=self._voltage(frame),
-            derating=float(servo_map.derating(frame.joint_temperature, self.config.servo).min()),
+            derating=servo_map.least_derating(frame.joint_temperature, self.config.servo),
             com=self._trunk.plan,
         )  # fmt: skip
         return self._planner.step(self._body, gait, around, self.period)

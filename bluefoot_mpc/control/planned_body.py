@@ -28,6 +28,7 @@ class PlannedBody:
 
     def __init__(self, servo: ServoParameters) -> None:
         self._fastest = servo.no_load_speed
+        self._twist = np.zeros((2, 3))  # over the ground, in axes of b'
         self.reset()
 
     def reset(self) -> None:
@@ -55,14 +56,16 @@ class PlannedBody:
         self.q[:3], self.q[3:7], self.q[7:] = place, quaternion_from_rpy(rpy), joints
         if self._last is not None:
             last_place, last_rpy, last_joints = self._last
-            x, y, _ = place.tolist()
-            over_ground = (place - last_place) / dt
-            over_ground[:2] += gait.velocity + gait.yaw_rate * np.array([-y, x])
+            (x, y, _), rate = place.tolist(), gait.yaw_rate
+            forward, left = gait.velocity.tolist()
+            over_ground, turning = self._twist
+            over_ground[:] = place - last_place
             # Trunk angles are small: their rates are taken for the angular velocity.
-            turning = (rpy - last_rpy) / dt
-            turning[2] += gait.yaw_rate
-            rotation = rotation_from_rpy(rpy)
-            self.v[:3], self.v[3:6] = over_ground @ rotation, turning @ rotation
+            turning[:] = rpy - last_rpy
+            self._twist /= dt
+            over_ground += (forward - rate * y, left + rate * x, 0.0)
+            turning[2] += rate
+            np.dot(self._twist, rotation_from_rpy(rpy), out=self.v[:6].reshape(2, 3))
             speed = (joints - last_joints) / dt
             self.v[6:] = np.minimum(np.maximum(speed, -self._fastest), self._fastest)
         self._last = (place, rpy, joints)

@@ -44,6 +44,13 @@ def derating(temperature: FloatArray, config: ServoMapConfig) -> FloatArray:
     return np.where(np.isfinite(left), np.minimum(np.maximum(left, 0.0), 1.0), 1.0)
 
 
+def least_derating(temperature: FloatArray, config: ServoMapConfig) -> float:
+    """The smallest of `derating`; mostly all servos are cool, which one look tells."""
+    if float(temperature.max()) <= config.derate_from:
+        return 1.0
+    return float(derating(temperature, config).min())
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Feed:
     """What is fed forward.

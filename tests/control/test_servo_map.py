@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from bluefoot_mpc.control.servo_map import Feed, ServoMapConfig, derating, goals
+from bluefoot_mpc.control.servo_map import Feed, ServoMapConfig, derating, goals, least_derating
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.model.parameters import load_parameters
 from bluefoot_mpc.model.servo import motor_torque
@@ -75,3 +75,10 @@ def test_a_stiffer_servo_needs_less_shift():
     ratio = goals(stiff, np.zeros(16), feed, 12.0, WIDE) / goals(SERVO, np.zeros(16), feed, 12.0, WIDE)
     np.testing.assert_allclose(ratio, SERVO.stiffness / stiff.stiffness)
     assert np.all(ratio < 1.0)
+
+
+@pytest.mark.parametrize("hottest", [20.0, 55.0, 60.0, 70.0, float("nan")])
+def test_the_least_share_is_that_of_the_hottest_servo(hottest):
+    config, temperature = ServoMapConfig(derate_from=55.0, derate_to=65.0), np.full(16, 30.0)
+    temperature[3] = hottest
+    assert least_derating(temperature, config) == derating(temperature, config).min()
