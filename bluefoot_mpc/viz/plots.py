@@ -114,7 +114,7 @@ def footfall(series: RunSeries, period: float) -> Panel:
                     "hoverinfo": "x+name",
                 }
             )
-    window = _gait_window(series)
+    window = gait_window(series)
     layout = {
         "yaxis": {
             "tickvals": [3, 2, 1, 0],
@@ -213,7 +213,7 @@ def motion(series: RunSeries) -> Panel:
     )
 
 
-def _gait_window(series: RunSeries) -> list[float]:
+def gait_window(series: RunSeries) -> list[float]:
     """A few cycles to begin with: the window of the run that the replay starts in."""
     width = min(6.0, max(series.duration, 0.1))
     start = width * np.floor(replay_start(series) / width)

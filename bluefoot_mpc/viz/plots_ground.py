@@ -49,7 +49,7 @@ def path(series: RunSeries) -> Panel:
     """The way over ground from above: trunk, footprints, and support polygons of the last steps."""
     pick = slice(None, None, stride_for(len(series.time), LIMIT))
     x, y = series.q[pick, 0], series.q[pick, 1]
-    traces: list[Trace] = [_polygons(series)]
+    traces: list[Trace] = [support_outlines(series)]
     for index, leg in enumerate(LEGS):
         prints = _footprints(series, index)
         traces.append(
@@ -103,15 +103,20 @@ def _margins(points: FloatArray, feet: FloatArray, stance: np.ndarray[Any, Any])
     return margins
 
 
-def _polygons(series: RunSeries, stretch: float = 2.0) -> Trace:
-    """Outlines of the support in the last `stretch` seconds of walking, each time it changes."""
+def last_steps(series: RunSeries, stretch: float) -> slice:
+    """Ticks of the last `stretch` seconds of walking; of the run where it did not walk."""
     moving = np.flatnonzero(series.walking)
     last = int(moving[-1]) if len(moving) else len(series.time) - 1
-    first = int(np.searchsorted(series.time, series.time[last] - stretch))
+    return slice(int(np.searchsorted(series.time, series.time[last] - stretch)), last + 1)
+
+
+def support_outlines(series: RunSeries, stretch: float = 2.0) -> Trace:
+    """Outlines of the support in the last `stretch` seconds of walking, each time it changes."""
+    pick = last_steps(series, stretch)
     x: list[float] = []
     y: list[float] = []
     before = None
-    for k in range(first, last + 1):
+    for k in range(pick.start, pick.stop):
         stance = tuple(series.scheduled[k])
         if stance == before or not any(stance):
             continue
@@ -124,7 +129,7 @@ def _polygons(series: RunSeries, stretch: float = 2.0) -> Trace:
         "mode": "lines",
         "x": pack(x),
         "y": pack(y),
-        "name": "support, last 2 s",
+        "name": f"support, last {stretch:g} s",
         "line": {"color": SUPPORT, "width": 1},
         "fill": "toself",
         "fillcolor": "rgba(18,161,124,0.07)",

@@ -9,10 +9,11 @@ from typing import Any
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.settings import dump_toml
-from bluefoot_mpc.viz import plots, plots_ground, plots_machine
+from bluefoot_mpc.viz import plots, plots_ground, plots_machine, plots_plan
 from bluefoot_mpc.viz.animation import animation_data, viewer_script
 from bluefoot_mpc.viz.packing import stretches
 from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
+from bluefoot_mpc.viz.plan_series import extract_plans
 from bluefoot_mpc.viz.plots import Panel
 from bluefoot_mpc.viz.scene import build_scene
 from bluefoot_mpc.viz.series import RunSeries, extract
@@ -54,7 +55,7 @@ def report_html(
     stall_torque = robot.parameters.servo.stall_torque
     series = extract(run, stall_torque)
     has_ticks = len(series.time) > 0
-    panels = _panels(series, stall_torque, run.period) if has_ticks else []
+    panels = _panels(run, series, stall_torque) if has_ticks else []
     judged = verdict(summary, checks)
     data = animation_data(build_scene(robot), series, robot.parameters.legs.foot_radius) if has_ticks else {}
     return render(
@@ -82,13 +83,15 @@ def report_html(
     )
 
 
-def _panels(series: RunSeries, stall_torque: float, period: float) -> list[Panel]:
+def _panels(run: RunData, series: RunSeries, stall_torque: float) -> list[Panel]:
+    period, plans = run.period, extract_plans(run, series)
     return [
         plots.footfall(series, period),
         plots.attitude(series),
         plots_ground.path(series),
         plots_ground.balance(series),
         plots.motion(series),
+        *(plots_plan.plan_panels(series, plans) if plans is not None else []),
         plots_machine.torques(series, stall_torque),
         plots_machine.torque_strip(series, stall_torque),
         plots_machine.temperatures(series, SERVO_TEMPERATURE_LIMIT),
