@@ -8,12 +8,22 @@ from bluefoot_mpc.types import (
     N_JOINTS,
     N_LEGS,
     Fallback,
+    FloatArray,
     PlanReport,
     SafetyLevel,
     SafetyRequest,
 )
 from bluefoot_mpc.wbc import WholeBodyPlan
 from bluefoot_mpc.zmp.preview import ComPlan
+
+
+def _unknown(*shape: int) -> FloatArray:
+    values = np.full(shape, np.nan)
+    values.flags.writeable = False
+    return values
+
+
+_NO_COM, _NO_FORCE, _NO_TORQUE = _unknown(3, 2), _unknown(N_LEGS, 3), _unknown(N_JOINTS)
 
 
 def report(com: ComPlan | None, body: WholeBodyPlan | None) -> PlanReport | None:
@@ -23,10 +33,10 @@ def report(com: ComPlan | None, body: WholeBodyPlan | None) -> PlanReport | None
     preview = Fallback.SOLVED if com is None else com.status
     whole_body = Fallback.SOLVED if body is None else body.status
     return PlanReport(
-        com=np.full((3, 2), np.nan) if com is None else com.start,
+        com=_NO_COM if com is None else com.start,
         margin=float("nan") if com is None else com.least_margin,
-        foot_force=np.full((N_LEGS, 3), np.nan) if body is None else body.foot_force,
-        torque=np.full(N_JOINTS, np.nan) if body is None else body.torque,
+        foot_force=_NO_FORCE if body is None else body.foot_force,
+        torque=_NO_TORQUE if body is None else body.torque,
         preview=preview,
         whole_body=whole_body,
         qp_failures=int(preview > Fallback.SOLVED) + int(whole_body > Fallback.SOLVED),
