@@ -29,9 +29,10 @@ class GroundAdaptationConfig:
     """How the feet follow the slope of the ground."""
 
     enabled: bool = False  # off, the ground is the horizontal plane of the paper's laws
-    time_constant: float = 0.03  # s, with which the slope follows the standing feet
+    time_constant: float = 0.02  # s, with which the slope ahead follows the standing feet
+    across: float = 0.1  # how much slower the slope across follows: what is met head on is the rule, 1
     max_slope: float = 0.27  # rise per metre (15°), steepest ground that the feet are put on
-    max_rate: float = 3.0  # 1/s, fastest change of the slope
+    max_rate: float = 6.0  # 1/s, fastest change of the slope
     even: float = 0.0015  # m, off the plane by which feet land on even ground at most
     extra_lift: float = 0.35  # share by which steps are higher after twice that much
     memory: float = 6.0  # s, for which an uneven place is remembered
@@ -42,6 +43,7 @@ class GroundAdaptationConfig:
         )
         require_range(0.0, 0.6, max_slope=self.max_slope)
         require_range(0.0, 2.0, extra_lift=self.extra_lift)
+        require_range(0.01, 1.0, across=self.across)
 
 
 class GroundAdapter:
@@ -49,7 +51,9 @@ class GroundAdapter:
 
     The slope moves towards that which fits the standing feet, along the
     directions in which they are apart: the diagonals of a trot show one
-    direction after the other, and what they do not show stays as it was.
+    direction after the other, and what they do not show stays as it was. Where
+    one diagonal cannot tell a slope ahead from one across, it counts as ahead:
+    then the foot that goes up a step after its neighbour is expected there.
 
     Attributes:
         slope: (2,) rise per metre along x and y of b'.
@@ -62,6 +66,7 @@ class GroundAdapter:
 
     def __init__(self, config: GroundAdaptationConfig) -> None:
         self._config = config
+        self._across = math.sqrt(config.across)
         self.reset()
 
     def reset(self) -> None:
@@ -110,11 +115,13 @@ class GroundAdapter:
 
     def _follow(self, points: list[list[float]], dt: float) -> float:
         """Turn the slope towards the plane through points (m); gives how far off it one lies, m."""
-        config = self._config
+        config, across = self._config, self._across
         slope_x, slope_y = self.slope.tolist()
-        (error_x, error_y), off = _slope_error(points, (slope_x, slope_y))
+        # Where lengths across count less, the same descent turns the slope across less.
+        squeezed = [[x, across * y, z] for x, y, z in points]
+        (error_x, error_y), off = _slope_error(squeezed, (slope_x, slope_y / across))
         share = min(1.0, dt / config.time_constant)
-        step = _shortened(share * error_x, share * error_y, config.max_rate * dt)
+        step = _shortened(share * error_x, share * across * error_y, config.max_rate * dt)
         self.slope = np.array(_shortened(slope_x + step[0], slope_y + step[1], config.max_slope))
         return off
 
