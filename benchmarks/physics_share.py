@@ -30,8 +30,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from bluefoot_mpc.control.names import CONTROLLERS
 from bluefoot_mpc.control.pipeline import Pipeline
-from bluefoot_mpc.control.presets import CONTROLLERS
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.loop import LoopHooks, run_loop
 from bluefoot_mpc.runtime.recorder import Recorder

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from bluefoot_mpc.control.presets import DEFAULT_CONTROLLER
+from bluefoot_mpc.control.names import DEFAULT_CONTROLLER
 from bluefoot_mpc.exceptions import ConfigurationError
 
 MAX_STATES = 1_000_000

@@ -7,24 +7,24 @@ from bluefoot_mpc.control.config import ControlConfig
 from bluefoot_mpc.control.gait_sway import SwayConfig
 from bluefoot_mpc.control.ground import GroundAdaptationConfig
 from bluefoot_mpc.control.level import CentringConfig
+from bluefoot_mpc.control.names import CONTROLLERS
 from bluefoot_mpc.control.posture import PostureConfig
 from bluefoot_mpc.control.servo_map import ServoMapConfig
 from bluefoot_mpc.control.tracking import TrackingConfig
 from bluefoot_mpc.exceptions import UnknownNameError
 from bluefoot_mpc.gait.config import GaitConfig
-from bluefoot_mpc.gait.table import GaitTable
-from bluefoot_mpc.gait.tuned import TROT
+from bluefoot_mpc.gait.tuned import LEG_LENGTH, TROT, WALK
+from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.zmp.preview.config import PreviewConfig, PreviewWeights
 from bluefoot_mpc.zmp.support import SupportConfig
 
-CONTROLLERS = ("cpg", "mpc")
-"""``cpg``: the paper's laws. ``mpc``: preview and whole-body control beside them."""
-DEFAULT_CONTROLLER = "cpg"
-"""What runs where nobody chooses."""
 
-
-def preset(name: str) -> ControlConfig:
+def preset(name: str, robot: RobotParameters | None = None) -> ControlConfig:
     """The configuration of a controller.
+
+    Args:
+        name: one of `CONTROLLERS`.
+        robot: whose legs the lengths are scaled to; None for BlueFoot's.
 
     Raises:
         UnknownNameError: there is no such controller.
@@ -32,10 +32,12 @@ def preset(name: str) -> ControlConfig:
     if name == "cpg":
         return ControlConfig()
     if name == "mpc":
+        # Rounded, so that BlueFoot itself is exactly of size one.
+        size = 1.0 if robot is None else round(sum(robot.legs.link_lengths) / LEG_LENGTH, 6)
         return ControlConfig(
             sway=SwayConfig(trot="static", walk="preview"),
             preview=_preview(),
-            gait=GaitConfig(trot_table=TROT, walk_table=_walk_table()),
+            gait=GaitConfig(trot_table=TROT.scaled(size), walk_table=WALK.scaled(size)),
             posture=PostureConfig(centring=CentringConfig(enabled=True)),
             tracking=TrackingConfig(velocity_gain=0.8, velocity_bound=0.08, wait_for_ramp=True),
             ground=GroundAdaptationConfig(enabled=True),
@@ -43,10 +45,6 @@ def preset(name: str) -> ControlConfig:
             servo=ServoMapConfig(mixing=0.6, back_emf=1.0),
         )
     raise UnknownNameError("controller", name, CONTROLLERS)
-
-
-def _walk_table() -> GaitTable:
-    return GaitTable(speed=(0.03,), step_height=(0.014,), mixing=(0.9,), back_emf=(0.5,))
 
 
 def _preview() -> PreviewConfig:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from bluefoot_mpc.exceptions import ConfigurationError
@@ -33,6 +33,7 @@ BOUNDS = {
     "mixing": (0.0, 1.0),
     "back_emf": (0.0, 1.5),
 }
+LENGTHS = ("step_height", "stance_x", "stance_y", "trunk_height", "trunk_forward")  # grow with the robot
 NAMES = ("law", "vertical")  # columns of words: the nearest knot's holds, from the next lift-off on
 
 
@@ -98,6 +99,15 @@ class GaitTable:
         """One value a knot; () when the column is empty."""
         values: tuple[Any, ...] = getattr(self, name)
         return values * len(self.speed) if len(values) == 1 else values
+
+    def scaled(self, factor: float) -> GaitTable:
+        """The table with every length `factor` times as long, for a robot of that size."""
+        if factor == 1.0:
+            return self
+        lengths: dict[str, Any] = {
+            name: tuple(factor * value for value in getattr(self, name)) for name in LENGTHS
+        }
+        return replace(self, **lengths)
 
     def effective_speed(self, velocity: complex, yaw_rate: float) -> float:
         """Speed at which the table is read, m/s.

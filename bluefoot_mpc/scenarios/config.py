@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from bluefoot_mpc.control.config import ControlConfig
-from bluefoot_mpc.control.presets import CONTROLLERS, DEFAULT_CONTROLLER, preset
+from bluefoot_mpc.control.names import CONTROLLERS, DEFAULT_CONTROLLER
+from bluefoot_mpc.control.presets import preset
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.io.safety import SafetyConfig
 from bluefoot_mpc.model.parameters import RobotParameters, load_parameters
@@ -79,25 +80,25 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
     for override in options.overrides:
         table = merge(table, parse_override(override))
     controller = _controller(table, options)
-    table = merge({"control": to_table(preset(controller))}, _without_run(table))
+    table = _without_run(table)
     stage_names = [f.name for f in fields(StageConfig)]
     for key, value in table.items():
         if key not in (*stage_names, "scenario", "model"):
             raise UnknownNameError("configuration section", key, (*stage_names, "scenario", "model"))
         if not isinstance(value, Mapping):
             raise ConfigurationError(f"{key} must be a table, not {value!r}")
+    parameters = _parameters(table, options)
+    table = merge({"control": to_table(preset(controller, parameters))}, table)
     scenario_table = merge(table.get("scenario", {}), _scenario_options(scenario, options))
     made = scenario(build(scenario.Config, scenario_table, "scenario"))
     stages = build(StageConfig, {key: table[key] for key in stage_names if key in table})
     sim = build(SimConfig, merge(to_table(stages.sim), _sim_options(options)), "sim")
     made.world = sim.world
     return Resolved(
-        run=RunSection(
-            scenario=scenario.name, seed=options.seed, robot=options.robot, controller=controller
-        ),
+        run=RunSection(scenario=scenario.name, seed=options.seed, robot=options.robot, controller=controller),
         scenario=made,
         stages=StageConfig(sim=made.prepare(sim), safety=stages.safety, control=stages.control),
-        parameters=_parameters(table, options),
+        parameters=parameters,
     )
 
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from bluefoot_mpc.control.presets import CONTROLLERS
+from bluefoot_mpc.control.names import CONTROLLERS
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 
 ROBOTS = ("sim",)

@@ -3,8 +3,9 @@ import tomllib
 import pytest
 
 from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.control.names import CONTROLLERS, DEFAULT_CONTROLLER
 from bluefoot_mpc.control.pipeline import Pipeline
-from bluefoot_mpc.control.presets import CONTROLLERS, DEFAULT_CONTROLLER, preset
+from bluefoot_mpc.control.presets import preset
 from bluefoot_mpc.exceptions import UnknownNameError
 from bluefoot_mpc.model.robot import load_robot
 from bluefoot_mpc.settings import build, dump_toml, to_table

@@ -69,7 +69,7 @@ def test_rethinking_the_log_gives_the_same_commands(result):
 
 def test_rethinking_with_other_gains_differs(result):
     log = read_log(result.folder / "log.mcap")
-    log.config["control"]["gait"]["trot"]["height_min"] += 0.001
+    log.config["control"]["tracking"]["velocity_gain"] += 0.1
 
     def make_step():
         pipeline = pipeline_from_log(log)
