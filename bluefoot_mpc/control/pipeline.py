@@ -36,6 +36,7 @@ from bluefoot_mpc.types import (
     Mode,
     MotionCommand,
     PostureReference,
+    SafetyLevel,
     SafetyRequest,
     SensorFrame,
     Telemetry,
@@ -76,6 +77,7 @@ class Pipeline:
         self._body = PlannedBody(robot.parameters.servo)
         self._planner = BodyPlanner(robot, config.whole_body)
         self._ground = GroundAdapter(config.ground)
+        self._step_back = plans.StepBack()
         self._require_reachable()
         self.reset()
 
@@ -92,7 +94,7 @@ class Pipeline:
         self._tracking = tracking.TrackingState()
         self._wanted = MotionCommand()
         self._notices: tuple[str, ...] = ()
-        self._own_request = SafetyRequest()
+        self._step_back.reset()
         self._walking = False
 
     def step(
@@ -109,8 +111,9 @@ class Pipeline:
         estimate = self._estimator.step(frame)
         upright = self._rotation_base_to_virtual(estimate)
         self._wanted, faults = usable(motion, self._wanted)
-        begun = self._begun(faults if estimate.healthy else (*faults, BLIND))
-        urgent = plans.more_urgent(safety or SafetyRequest(), self._own_request)
+        own = self._step_back.request
+        begun = self._begun((*faults, *own.reasons) if estimate.healthy else (*faults, *own.reasons, BLIND))
+        urgent = plans.more_urgent(safety or SafetyRequest(), own)
         changed = self._advance_mode(urgent, float(upright[2, 2]))
         motion = self._in_force(self._wanted, estimate)
         twist = self._corrected(motion, estimate, upright)
@@ -124,7 +127,7 @@ class Pipeline:
         plan = self._planned(gait, reference, joints, frame)
         goals = self._goals(gait.style, joints, plan, frame)
         planned = plans.report(self._trunk.plan, plan)
-        self._own_request = plans.step_back(planned)
+        self._step_back.step(planned, dt)
         command = JointCommand(
             position=goals, speed=np.zeros(N_JOINTS), torque_limit=np.full(N_JOINTS, self._modes.torque)
         )
@@ -264,5 +267,6 @@ class Pipeline:
             trunk_position=trunk,
             # No reflex on a rate that is no longer measured.
             tilt_rate_error=error if estimate.healthy else np.zeros(2),
-            halt=self._modes.mode is Mode.SAFE,
+            # Steps without a plan are not taken: feet in the air land at once.
+            halt=self._modes.mode is Mode.SAFE or self._step_back.request.level >= SafetyLevel.HOLD,
         )  # fmt: skip

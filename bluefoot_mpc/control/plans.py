@@ -16,6 +16,9 @@ from bluefoot_mpc.types import (
 from bluefoot_mpc.wbc import WholeBodyPlan
 from bluefoot_mpc.zmp.preview import ComPlan
 
+_KEPT = 2.0
+"""s for which a request outlasts its cause."""
+
 
 def _unknown(*shape: int) -> FloatArray:
     values = np.full(shape, np.nan)
@@ -44,8 +47,40 @@ def report(com: ComPlan | None, body: WholeBodyPlan | None) -> PlanReport | None
     )
 
 
-def step_back(plans: PlanReport | None) -> SafetyRequest:
-    """What the controller itself asks for on the next tick: to stand without a plan, then to sit."""
+class StepBack:
+    """What the controller itself asks for when its plans come from down the ladder: to stand, then to sit.
+
+    A request outlasts its cause a little. At rest there is hardly anything to
+    solve, so that a solver which failed under way seems to be well as soon as
+    the robot stands: it would set off and stop again with every step.
+
+    Attributes:
+        request: what is asked for on the next tick.
+    """
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Ask for nothing."""
+        self.request = SafetyRequest()
+        self._left = 0.0  # s for which the present request is kept
+
+    def step(self, plans: PlanReport | None, dt: float) -> None:
+        """Take the plans of a tick.
+
+        Args:
+            plans: None where nothing was planned.
+            dt: s.
+        """
+        wanted = _wanted(plans)
+        self._left -= dt
+        if wanted.level >= self.request.level or self._left <= 0.0:
+            self.request, self._left = wanted, _KEPT
+
+
+def _wanted(plans: PlanReport | None) -> SafetyRequest:
+    """What the plans of one tick ask for."""
     if plans is None:
         return SafetyRequest()
     rung = max(plans.preview, plans.whole_body)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from bluefoot_mpc.exceptions import UnknownNameError
+from bluefoot_mpc.qp import SOLVERS
 from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
 
 Triple = tuple[float, float, float]
@@ -74,6 +76,8 @@ class WholeBodyConfig:
     codegen: bool = True  # generate and build C where a compiler exists
 
     def __post_init__(self) -> None:
+        if self.solver not in SOLVERS:
+            raise UnknownNameError("solver", self.solver, SOLVERS)
         require_positive(
             friction=self.friction, force_limit=self.force_limit, limit_horizon=self.limit_horizon,
             joint_acceleration=self.joint_acceleration,

@@ -56,9 +56,10 @@ def test_an_unknown_solver_is_refused_with_the_names_of_all(key, capfd, tmp_path
     assert main([*words, "--out", str(tmp_path / "run")]) == 2
     said = capfd.readouterr().err
     line = next(line for line in said.splitlines() if "foo" in line)
-    assert "unknown solver 'foo'" in line
+    assert f"[{key.removesuffix('.solver')}] unknown solver 'foo'" in line
     assert all(name in line for name in SOLVERS)
     assert "Traceback" not in said
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from bluefoot_mpc.wbc import WholeBodyPlan
 from bluefoot_mpc.zmp.preview import ComPlan
 
 NONE = SafetyRequest()
+DT = 0.02
 
 
 def com_plan(status=Fallback.SOLVED, margin=(0.02, 0.01, np.nan)) -> ComPlan:
@@ -62,7 +63,7 @@ def test_what_was_not_planned_is_nan():
 def test_the_lower_of_both_rungs_decides_and_is_named(preview, whole_body):
     report = account(preview, whole_body)
     assert report.qp_failures == (preview > Fallback.SOLVED) + (whole_body > Fallback.SOLVED)
-    request = plans.step_back(report)
+    request = asked(report)
     rung = max(preview, whole_body)
     wanted = SafetyLevel.NONE
     if rung is Fallback.STANCE:
@@ -76,8 +77,37 @@ def test_the_lower_of_both_rungs_decides_and_is_named(preview, whole_body):
         assert request == NONE
 
 
+def asked(report) -> SafetyRequest:
+    """What one tick's plans ask for."""
+    step_back = plans.StepBack()
+    step_back.step(report, DT)
+    return step_back.request
+
+
 def test_no_plan_asks_for_nothing():
-    assert plans.step_back(None) == NONE
+    assert asked(None) == NONE
+
+
+def test_a_request_outlasts_its_cause_for_two_seconds():
+    step_back = plans.StepBack()
+    step_back.step(account(Fallback.STANCE), DT)
+    for _ in range(99):
+        step_back.step(account(), DT)
+        assert step_back.request.level is SafetyLevel.HOLD
+    for _ in range(2):
+        step_back.step(None, DT)
+    assert step_back.request == NONE
+
+
+def test_what_is_more_urgent_counts_at_once_and_what_is_less_waits():
+    step_back = plans.StepBack()
+    levels = []
+    for rung in (Fallback.STANCE, Fallback.SIT, Fallback.STANCE, Fallback.SOLVED):
+        step_back.step(account(whole_body=rung), DT)
+        levels.append(step_back.request.level)
+    assert levels == [SafetyLevel.HOLD, SafetyLevel.SIT, SafetyLevel.SIT, SafetyLevel.SIT]
+    step_back.reset()
+    assert step_back.request == NONE
 
 
 def test_the_more_urgent_request_counts_and_equals_give_both_reasons():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.qp import SOLVERS
 from bluefoot_mpc.settings import require_nonnegative, require_positive
 from bluefoot_mpc.zmp.support import SupportConfig
 
@@ -57,17 +58,21 @@ class PreviewConfig:
     rounds: int = 8  # problems of one size per plan, before a larger one is posed
     tolerance: float = 1e-7  # m, violation that is none
     nearest_violation: float = 0.006  # m out of a region at which an approximate plan is still used
+    shift_time: float = 0.3  # s for which the previous plan stands in for one that failed
     stance_speed: float = 0.05  # m/s towards the middle of the feet when there is no plan
 
     def __post_init__(self) -> None:
         """Check names and ranges."""
         if self.law not in LAWS:
             raise UnknownNameError("preview law", self.law, LAWS)
+        if self.solver not in SOLVERS:
+            raise UnknownNameError("solver", self.solver, SOLVERS)
         require_positive(
             interval=self.interval,
             height=self.height,
             tolerance=self.tolerance,
             nearest_violation=self.nearest_violation,
+            shift_time=self.shift_time,
             stance_speed=self.stance_speed,
             reach_forward=self.reach[0],
             reach_sideways=self.reach[1],

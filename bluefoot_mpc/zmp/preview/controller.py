@@ -129,7 +129,9 @@ class PreviewController:
         if self._good is None:
             return None
         age = self._clock - self._good.made
-        if not 0.0 <= age < float(self._good.plan.time[-1]) - self.config.interval:
+        lasts = float(self._good.plan.time[-1]) - self.config.interval
+        # Towards its end a plan is only as good as the last capture point: it is not followed that far.
+        if not 0.0 <= age < min(self.config.shift_time, lasts):
             return None
         return shifted(self._good.plan, age, self._good.pose, pose)
 

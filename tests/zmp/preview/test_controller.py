@@ -252,7 +252,7 @@ def test_an_answer_that_is_no_number_is_never_used():
     sane(plan)
 
 
-def test_then_the_last_plan_goes_on_as_long_as_it_lasts_and_then_the_way_to_the_feet():
+def test_then_the_last_plan_goes_on_for_a_while_and_then_the_way_to_the_feet():
     config = dataclasses.replace(CONFIG, nearest_violation=1e-9)
     controller, solvers = switched(config)
     first = controller.step(hard(), DT)
@@ -273,7 +273,7 @@ def test_then_the_last_plan_goes_on_as_long_as_it_lasts_and_then_the_way_to_the_
             assert plan.at(0.0) == pytest.approx(carried(first.at(clock), np.zeros(3), pose), abs=1e-9)
     lasted = statuses.count(Fallback.SHIFTED)
     assert statuses == [Fallback.SHIFTED] * lasted + [Fallback.STANCE] * (60 - lasted)
-    assert (lasted + 1) * DT == pytest.approx(first.time[-1] - CONFIG.interval, abs=DT)
+    assert (lasted + 1) * DT == pytest.approx(CONFIG.shift_time, abs=DT)
 
 
 def test_the_way_to_the_feet_is_slow_and_arrives():
