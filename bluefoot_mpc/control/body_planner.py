@@ -14,7 +14,7 @@ import numpy as np
 from bluefoot_mpc.control.planned_body import PlannedBody
 from bluefoot_mpc.gait.gait import FootMotion, GaitOutput
 from bluefoot_mpc.model.robot import RobotModel
-from bluefoot_mpc.types import N_LEGS, FloatArray
+from bluefoot_mpc.types import FloatArray
 from bluefoot_mpc.wbc import (
     WholeBodyConfig,
     WholeBodyController,
@@ -126,8 +126,3 @@ def _normal(slope: FloatArray) -> FloatArray | None:
         return None
     normal = np.array([-slope[0], -slope[1], 1.0])
     return np.asarray(normal / np.sqrt(normal @ normal))
-
-
-def no_forces() -> FloatArray:
-    """(4, 3) NaN: nothing was planned."""
-    return np.full((N_LEGS, 3), np.nan)

@@ -218,8 +218,9 @@ class Pipeline:
             return gait
         if estimate.healthy:
             standing = estimate.contact & ~gait.phase.swing
-            self._ground.step(estimate.foot_position_in_base @ upright.T, standing, dt)
-        return replace(gait, foot_position=self._ground.place(gait.foot_position))
+            feet = estimate.foot_position_in_base @ upright.T
+            self._ground.step(feet, standing, dt, walking=gait.phase.walking)
+        return replace(gait, foot_position=self._ground.place(gait.foot_position, gait.foot_height))
 
     def _planned(
         self, gait: GaitOutput, reference: PostureReference, joints: FloatArray, frame: SensorFrame
