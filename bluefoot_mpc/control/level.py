@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.gait.gait import GaitOutput
 from bluefoot_mpc.settings import require_finite, require_nonnegative, require_positive
 from bluefoot_mpc.types import FloatArray
@@ -32,6 +33,10 @@ class CentringConfig:
     enabled: bool = False  # off, the trunk stays where the paper's laws put it
     gain: float = 0.5  # m per rad and s; 0.8 rad of tilt per metre make that 2.5 s
     lead_deg: float = 55.0  # degrees of the cycle by which the tilt comes before FL's lift-off
+    slow: float = 0.12  # m/s, up to which the gain holds
+    fast: float = (
+        0.18  # m/s, from which on nothing is learnt: the swing's own rocking would be taken for a load
+    )
     bound: float = 0.015  # m, largest shift of the trunk, each axis
     max_tilt: float = 0.05  # rad, beyond it the robot was pushed, and what it does tells nothing
 
@@ -39,12 +44,14 @@ class CentringConfig:
         require_nonnegative(gain=self.gain, bound=self.bound)
         require_positive(max_tilt=self.max_tilt)
         require_finite(lead_deg=self.lead_deg)
+        if not 0.0 <= self.slow < self.fast:
+            raise ConfigurationError(f"slow = {self.slow!r} must be below fast = {self.fast!r} (m/s)")
 
 
 class Centring:
     """Finds where over the feet the trunk has to be, whatever it carries.
 
-    What was found is kept while the robot stands or walks otherwise.
+    What was found is kept while the robot stands, walks otherwise or goes fast.
 
     Attributes:
         offset: (2,) m, shift of the trunk in b'.
@@ -78,7 +85,9 @@ class Centring:
         phase: list[float] = gait.phase.phase.tolist()
         if not is_trot(phase):
             return
-        share = 2.0 * config.gain * dt * math.cos(2.0 * math.pi * phase[0] + self._lead)
+        speed = math.hypot(*gait.velocity.tolist())
+        gain = config.gain * min(1.0, max(0.0, (config.fast - speed) / (config.fast - config.slow)))
+        share = 2.0 * gain * dt * math.cos(2.0 * math.pi * phase[0] + self._lead)
         x, y = self.offset.tolist()
         most = config.bound
         self.offset = np.array(

@@ -57,6 +57,16 @@ def test_the_shift_is_bounded():
     np.testing.assert_allclose(np.abs(law.offset), 0.004, atol=5e-4)
 
 
+def test_a_fast_trot_teaches_nothing():
+    law, step = centring(slow=0.05, fast=0.1), walk(speed=0.3)
+    while np.hypot(*(output := step()).velocity) < 0.1:
+        pass
+    for _ in range(100):
+        law.step(tilt_of(np.array([0.006, 0.003]), output), output, DT)
+        output = step()
+    assert not law.offset.any()
+
+
 def learnt() -> Centring:
     law, step = centring(), walk()
     for _ in range(100):
@@ -106,7 +116,9 @@ def test_trot_and_walk_are_told_apart():
     assert not is_trot([0.0, 0.0, 0.0, 0.0])
 
 
-@pytest.mark.parametrize("bad", [{"gain": -1.0}, {"max_tilt": 0.0}, {"bound": -0.1}, {"lead_deg": math.nan}])
+@pytest.mark.parametrize(
+    "bad", [{"gain": -1.0}, {"max_tilt": 0.0}, {"bound": -0.1}, {"lead_deg": math.nan}, {"slow": 0.2}]
+)
 def test_impossible_values_are_refused(bad):
     with pytest.raises(ConfigurationError, match=next(iter(bad))):
         CentringConfig(**bad)
