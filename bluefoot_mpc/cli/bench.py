@@ -80,6 +80,8 @@ def plan_of(command: BenchCommand) -> Plan:
     for part in parts:
         if part not in PARTS:
             raise UnknownNameError("part", part, PARTS)
+    if not parts:
+        raise ConfigurationError(f"--parts names no part. Valid: {', '.join(PARTS)}")
     seeds = FULL_SEEDS if command.full else command.seeds
     names = tuple(ablation.bench_cases()) if command.full else _names(command.cases)
     rows = variants(_names(command.variants))

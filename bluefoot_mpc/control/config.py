@@ -9,6 +9,7 @@ from bluefoot_mpc.control.gait_sway import SwayConfig
 from bluefoot_mpc.control.ground import GroundAdaptationConfig
 from bluefoot_mpc.control.modes import ModeConfig
 from bluefoot_mpc.control.posture import PostureConfig
+from bluefoot_mpc.control.push_recovery import PushRecoveryConfig
 from bluefoot_mpc.control.servo_map import ServoMapConfig
 from bluefoot_mpc.control.tracking import TrackingConfig
 from bluefoot_mpc.estimation.config import EstimatorConfig
@@ -31,6 +32,7 @@ class ControlConfig:
     preview: PreviewConfig = field(default_factory=PreviewConfig)
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
     ground: GroundAdaptationConfig = field(default_factory=GroundAdaptationConfig)
+    push_recovery: PushRecoveryConfig = field(default_factory=PushRecoveryConfig)
     whole_body: BodyPlannerConfig = field(default_factory=BodyPlannerConfig)
     servo: ServoMapConfig = field(default_factory=ServoMapConfig)
     modes: ModeConfig = field(default_factory=ModeConfig)

@@ -1,7 +1,8 @@
 """The stages in their order: the only place that knows it.
 
-sensors -> estimation -> modes -> tracking -> gait and footholds -> trunk
-placement -> inverse kinematics -> joint goals.
+sensors -> estimation -> modes -> tracking -> gait and footholds -> ground plane
+-> trunk placement (static law or preview) -> inverse kinematics -> whole-body
+problem -> servo mapping -> joint goals.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from bluefoot_mpc.control.ground import GroundAdapter
 from bluefoot_mpc.control.leg_masses import LegMasses
 from bluefoot_mpc.control.planned_body import PlannedBody
 from bluefoot_mpc.control.preview_sway import PreviewSway
+from bluefoot_mpc.control.push_recovery import PushRecovery
 from bluefoot_mpc.control.sway import Sway
 from bluefoot_mpc.control.targets import JointTargets
 from bluefoot_mpc.control.trunk import Footing, JointsInStance, TrunkPlanner
@@ -55,7 +57,7 @@ class ControlOutput:
 
 
 class Pipeline:
-    """The paper's laws, from a sensor frame to joint goals.
+    """From a sensor frame to joint goals: the paper's laws, and model-based control beside them.
 
     Args:
         robot: the robot's model.
@@ -77,6 +79,7 @@ class Pipeline:
         self._body = PlannedBody(robot.parameters.servo)
         self._planner = BodyPlanner(robot, config.whole_body)
         self._ground = GroundAdapter(config.ground)
+        self._recovery = PushRecovery(config.push_recovery)
         self._step_back = plans.StepBack()
         self._require_reachable()
         self.reset()
@@ -90,6 +93,8 @@ class Pipeline:
         self._body.reset()
         self._planner.reset()
         self._ground.reset()
+        self._recovery.reset()
+        self._told = np.zeros(2)
         self._modes = modes.ModeState()
         self._tracking = tracking.TrackingState()
         self._wanted = MotionCommand()
@@ -120,6 +125,7 @@ class Pipeline:
         gait = self._gait.step(self._gait_inputs(twist, motion, estimate, upright), dt)
         self._walking = gait.phase.walking
         self._tracking = tracking.followed(self._tracking, twist, gait.velocity)
+        self._told = gait.velocity
         gait = self._on_the_ground(gait, estimate, upright, dt)
         footing = self._footing(estimate)
         reference, zmp, held = self._trunk.step(gait, motion, estimate, footing, dt)
@@ -255,6 +261,13 @@ class Pipeline:
         known = frame.voltage_valid and frame.voltage > 0.5 * servo.nominal_voltage
         return frame.voltage if known else servo.nominal_voltage
 
+    def _shift_after_push(self, estimate: BodyState, upright: FloatArray) -> FloatArray | None:
+        """(2,) m in b', where footholds go after a hard push."""
+        if not (self._walking and estimate.healthy):
+            return None
+        velocity = (upright @ estimate.linear_velocity)[:2]
+        return self._recovery.step(velocity, self._told + self._trunk.velocity, estimate.height)
+
     def _gait_inputs(
         self, twist: tracking.Twist, motion: MotionCommand, estimate: BodyState, upright: FloatArray
     ) -> GaitInputs:
@@ -265,7 +278,7 @@ class Pipeline:
         return GaitInputs(
             velocity=twist.velocity, yaw_rate=twist.yaw_rate, gait=motion.gait, contact=estimate.contact,
             foot_position=estimate.foot_position_in_base @ upright.T + trunk,
-            trunk_position=trunk,
+            trunk_position=trunk, foothold_shift=self._shift_after_push(estimate, upright),
             # No reflex on a rate that is no longer measured.
             tilt_rate_error=error if estimate.healthy else np.zeros(2),
             # Steps without a plan are not taken: feet in the air land at once.

@@ -49,6 +49,6 @@ def preset(name: str, robot: RobotParameters | None = None) -> ControlConfig:
 
 def _preview() -> PreviewConfig:
     return PreviewConfig(
-        reach=(0.05, 0.05), centre_pull=0.2, support=SupportConfig(margin=0.025),
+        centre_pull=0.2, support=SupportConfig(margin=0.025),
         weights=PreviewWeights(jerk=5e-6),
     )  # fmt: skip

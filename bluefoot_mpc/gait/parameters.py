@@ -19,7 +19,6 @@ class Style(NamedTuple):
         trunk_forward: m, trunk origin ahead of the middle of the feet.
         ankle_shift: rad, added to the ankle direction.
         level_gain: 1/s, slow integral levelling.
-        rate_damping: gain of the trunk's rate damping, in its law's own unit.
         mixing: share of the planned torque that the goals feed forward.
         back_emf: share of what back-EMF takes at the planned speed.
     """
@@ -28,7 +27,6 @@ class Style(NamedTuple):
     trunk_forward: float = 0.0
     ankle_shift: float = 0.0
     level_gain: float = 0.0
-    rate_damping: float = 0.0
     mixing: float = 0.0
     back_emf: float = 0.0
 

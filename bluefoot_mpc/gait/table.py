@@ -29,9 +29,8 @@ BOUNDS = {
     "trunk_forward": (-0.2, 0.2),
     "ankle_shift": (-1.5, 1.5),
     "level_gain": (0.0, 100.0),
-    "rate_damping": (-100.0, 100.0),
     "mixing": (0.0, 1.0),
-    "back_emf": (0.0, 1.5),
+    "back_emf": (0.0, 1.0),
 }
 LENGTHS = ("step_height", "stance_x", "stance_y", "trunk_height", "trunk_forward")  # grow with the robot
 NAMES = ("law", "vertical")  # columns of words: the nearest knot's holds, from the next lift-off on
@@ -63,7 +62,6 @@ class GaitTable:
     trunk_forward: tuple[float, ...] = ()  # m, trunk origin ahead of the middle of the feet
     ankle_shift: tuple[float, ...] = ()  # rad, added to the ankle direction
     level_gain: tuple[float, ...] = ()  # 1/s, slow integral levelling
-    rate_damping: tuple[float, ...] = ()  # gain of the trunk's rate damping, in its law's own unit
     mixing: tuple[float, ...] = ()  # share of the planned torque that the goals feed forward, 1
     back_emf: tuple[float, ...] = ()  # the same of what back-EMF takes, 1
     turn_lever: float = 0.15  # m, effective speed per yaw rate

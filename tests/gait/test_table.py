@@ -12,7 +12,7 @@ from bluefoot_mpc.gait.transition import RhythmFamily
 from bluefoot_mpc.settings import build, dump_toml, to_table
 from tests.gait.walker import DT, REFERENCE, STANCE, command, drive
 
-STYLE = Style(trunk_height=0.115, trunk_forward=0.0, ankle_shift=0.0, level_gain=0.15, rate_damping=0.0)
+STYLE = Style(trunk_height=0.115, trunk_forward=0.0, ankle_shift=0.0, level_gain=0.15)
 TABLE = GaitTable(
     speed=(0.0, 0.2, 0.4),
     cycle_time=(0.45, 0.2, 0.24),

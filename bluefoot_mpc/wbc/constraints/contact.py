@@ -1,4 +1,4 @@
-"""Standing feet do not slip: a constraint with slack, the slack weighted far above the tasks.
+"""Standing feet do not slip: a constraint with slack, the slack weighted above every task.
 
 As a hard equality it would make a stance that cannot hold (a leg stretched out, two
 feet in one place) infeasible; with the slack substituted it costs no unknown and no row.

@@ -9,6 +9,8 @@ from bluefoot_mpc.qp import SOLVERS
 from bluefoot_mpc.settings import require_nonnegative, require_positive
 from bluefoot_mpc.zmp.support import SupportConfig
 
+MOST_SAMPLES = 300
+"""Beyond it building the problem takes minutes."""
 LAWS: tuple[str, ...] = ("constrained", "kajita", "unconstrained")
 """Ways to plan: the quadratic program, Kajita's preview gain, the program's cost without its constraints."""
 
@@ -80,6 +82,10 @@ class PreviewConfig:
         if not 0.0 <= self.centre_pull <= 1.0:
             raise ConfigurationError(f"centre_pull must lie in [0, 1], not {self.centre_pull!r}")
         require_nonnegative(depth=self.depth)
+        if self.samples > MOST_SAMPLES:
+            raise ConfigurationError(
+                f"samples = {self.samples!r} must not exceed {MOST_SAMPLES}: a plan is made on every tick"
+            )
         for name, least in (("samples", 2), ("rounds", 1)):
             if getattr(self, name) < least:
                 raise ConfigurationError(f"{name} must be at least {least}, not {getattr(self, name)!r}")
