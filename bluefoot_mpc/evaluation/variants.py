@@ -13,6 +13,9 @@ NO_TORQUE = (
 )  # fmt: skip
 """What switches a part off, wherever its share is stated: the tables of the gaits have the last word."""
 
+LIFT = ("control.gait.walk_table.step_height=[0.02]",)
+"""Without torque soft legs sag and the walk's low step would drag: it is that of the paper's laws again."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Variant:
@@ -34,12 +37,12 @@ class Variant:
 VARIANTS = (
     Variant(name="cpg", controller="cpg", meaning="the paper's laws"),
     Variant(
-        name="timing", controller="mpc", overrides=(*NO_PREVIEW, *NO_WHOLE_BODY),
+        name="timing", controller="mpc", overrides=(*NO_PREVIEW, *NO_WHOLE_BODY, *LIFT),
         meaning="gait tables, estimator and levelling of mpc, and the paper's sway",
     ),
-    Variant(name="preview", controller="mpc", overrides=NO_WHOLE_BODY, meaning="timing and the ZMP preview"),
+    Variant(name="preview", controller="mpc", overrides=(*NO_WHOLE_BODY, *LIFT), meaning="timing and the ZMP preview"),
     Variant(
-        name="wbc", controller="mpc", overrides=NO_TORQUE,
+        name="wbc", controller="mpc", overrides=(*NO_TORQUE, *LIFT),
         meaning="preview and the whole-body problem: speed fed forward, no torque",
     ),
     Variant(name="mpc", controller="mpc", meaning="wbc and torque fed forward: all of mpc"),
