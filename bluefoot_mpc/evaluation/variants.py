@@ -40,7 +40,10 @@ VARIANTS = (
         name="timing", controller="mpc", overrides=(*NO_PREVIEW, *NO_WHOLE_BODY, *LIFT),
         meaning="gait tables, estimator and levelling of mpc, and the paper's sway",
     ),
-    Variant(name="preview", controller="mpc", overrides=(*NO_WHOLE_BODY, *LIFT), meaning="timing and the ZMP preview"),
+    Variant(
+        name="preview", controller="mpc", overrides=(*NO_WHOLE_BODY, *LIFT),
+        meaning="timing and the ZMP preview",
+    ),
     Variant(
         name="wbc", controller="mpc", overrides=(*NO_TORQUE, *LIFT),
         meaning="preview and the whole-body problem: speed fed forward, no torque",
