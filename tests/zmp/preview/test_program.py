@@ -111,7 +111,7 @@ def test_the_answer_does_not_depend_on_the_sizes(bench, rows):
         assert other.problem.path[:12] == pytest.approx(bench.problem.path[:12], abs=1e-7)
 
 
-@pytest.mark.parametrize("name", ["proxsuite", "quadprog", "piqp"])
+@pytest.mark.parametrize("name", ["proxsuite", "casadi-daqp", "casadi-qpoases"])
 def test_the_answer_does_not_depend_on_the_solver(bench, name):
     other = Bench(solver=name)
     for inputs, start in cases(CONFIG, 12, seed=4):
