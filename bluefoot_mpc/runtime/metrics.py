@@ -11,12 +11,9 @@ import math
 
 import numpy as np
 
-from bluefoot_mpc.geometry import convex_hull, signed_margin
 from bluefoot_mpc.model.parameters import GRAVITY
 from bluefoot_mpc.types import LEGS, BoolArray, FloatArray
 
-MIN_STANCE_FEET = 3
-"""Feet that make a support polygon."""
 _MIN_LOAD = 0.05
 """Share of the weight under which feet carry too little for a ZMP to mean anything."""
 _FIRST_LAG = -1.0 / 8.0
@@ -128,21 +125,6 @@ def zero_moment_points(
     x = com[:, 0] - (height * force[:, 0] + moment[:, 1]) / load
     y = com[:, 1] - (height * force[:, 1] - moment[:, 0]) / load
     return np.stack([x, y], axis=1)
-
-
-def support_margins(point: FloatArray, foot: FloatArray, stance: BoolArray) -> FloatArray:
-    """(n,) m, signed margin of points to the hulls of the standing feet, NaN without a hull.
-
-    Args:
-        point: (n, 2) m.
-        foot: (n, 4, 2) m.
-        stance: (n, 4) True where a foot counts.
-    """
-    margins = np.full(len(point), np.nan)
-    usable = (stance.sum(axis=1) >= MIN_STANCE_FEET) & np.isfinite(point).all(axis=1)
-    for k in np.flatnonzero(usable):
-        margins[k] = signed_margin(point[k], convex_hull(foot[k][stance[k]]))
-    return margins
 
 
 def swing_apexes(height: FloatArray, swing: BoolArray) -> FloatArray:

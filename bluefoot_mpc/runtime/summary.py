@@ -23,6 +23,7 @@ from bluefoot_mpc.runtime import metrics
 from bluefoot_mpc.runtime.data import COMPLETED, RunData
 from bluefoot_mpc.runtime.window import Window, cut_window, measurement_window, wanted_commands
 from bluefoot_mpc.types import Mode
+from bluefoot_mpc.zmp.support import support_margins
 
 if TYPE_CHECKING:
     from bluefoot_mpc.model.robot import RobotModel
@@ -191,8 +192,8 @@ def _balance(cut: Window, foot_radius: float) -> dict[str, Any]:
         cut.time, truth("com"), truth("momentum"), push, ground, mass=_mass(cut)
     )
     foot = 0.5 * (cut.foot_position[1:, :, :2] + cut.foot_position[:-1, :, :2])
-    margin = metrics.support_margins(point, foot, stance[:-1])
-    plan = metrics.support_margins(cut.planned_zmp, cut.reference_foot[:, :, :2], ~cut.reference_swing)
+    margin = support_margins(point, foot, stance[:-1])
+    plan = support_margins(cut.planned_zmp, cut.reference_foot[:, :, :2], ~cut.reference_swing)
     known, apexes = margin[np.isfinite(margin)], metrics.swing_apexes(cut.foot_height, cut.swing)
     return {
         "zmp_inside_fraction": np.mean(known >= 0.0) if known.size else None,

@@ -10,6 +10,7 @@ import pytest
 from bluefoot_mpc.geometry import quaternion_from_rpy, rotation_from_rpy
 from bluefoot_mpc.model.parameters import GRAVITY
 from bluefoot_mpc.runtime import metrics
+from bluefoot_mpc.zmp.support import support_margins
 
 MASS = 1.9
 TIME = 0.02 * np.arange(500)
@@ -121,7 +122,7 @@ def test_zmp_in_flight_is_unknown() -> None:
 def test_support_margins_need_three_feet() -> None:
     stance = np.array([[1, 1, 1, 1], [1, 1, 1, 0], [1, 0, 0, 1], [1, 1, 1, 1]], dtype=bool)
     point = np.array([[0.0, 0.03], [-0.05, -0.05], [0.0, 0.0], [0.0, 0.12]])
-    margins = metrics.support_margins(point, np.tile(SQUARE, (4, 1, 1)), stance)
+    margins = support_margins(point, np.tile(SQUARE, (4, 1, 1)), stance)
     assert margins[[0, 3]] == pytest.approx([0.07, -0.02])
     assert margins[1] == pytest.approx(-0.05 * math.sqrt(2.0))  # behind the diagonal of the three feet
     assert np.isnan(margins[2])
