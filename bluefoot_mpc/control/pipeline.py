@@ -77,7 +77,7 @@ class Pipeline:
         self._targets = JointTargets(geometry, config.ankle)
         self._trunk = TrunkPlanner(stance, config.posture, self._sway, self._targets.reach)
         self._body = PlannedBody(robot.parameters.servo)
-        self._planner = BodyPlanner(robot, config.whole_body)
+        self._planner = BodyPlanner(robot, config.whole_body) if config.whole_body.enabled else None
         self._ground = GroundAdapter(config.ground)
         self._recovery = PushRecovery(config.push_recovery)
         self._step_back = plans.StepBack()
@@ -91,7 +91,8 @@ class Pipeline:
         self._trunk.reset()
         self._targets.reset()
         self._body.reset()
-        self._planner.reset()
+        if self._planner is not None:
+            self._planner.reset()
         self._ground.reset()
         self._recovery.reset()
         self._told = np.zeros(2)
@@ -233,7 +234,7 @@ class Pipeline:
     ) -> WholeBodyPlan | None:
         """The whole-body plan behind the references; None where none is wanted."""
         self._body.step(gait, reference, joints, self.period)
-        if not self.config.whole_body.enabled or not self._targets.started:
+        if self._planner is None or not self._targets.started:
             return None
         feet = self._gait.feet_ahead() if self.config.whole_body.swing_acceleration > 0.0 else None
         around = Surroundings(
