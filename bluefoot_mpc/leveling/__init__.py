@@ -1,0 +1,1 @@
+"""Trunk levelling: what the legs' motion does to the trunk is learnt and counteracted."""
