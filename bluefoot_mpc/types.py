@@ -320,6 +320,36 @@ class PlanReport:
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
+class LevelReport:
+    """What the trunk-levelling compensator did on one tick.
+
+    Angular accelerations are those of the trunk that everything but the motors
+    gives it: what the levelling torque has to make up for.
+
+    Attributes:
+        share: how far the compensator acts on the goals: 0 off, 1 fully on, between them it fades.
+        training: True when the network learnt on this tick.
+        stopped: why it has disengaged itself; empty while it has not.
+        disturbance: (3,) rad/s², predicted for the coming period, base frame.
+        measured: (3,) rad/s², the same from the period that just ended; NaN before the second tick.
+        torque: (16,) N·m, levelling torque before mixing and limits.
+        contact_force: (4, 3) N, estimated force of the ground on each foot, world axes.
+        mse: low-passed squared error of the network, scaled units; NaN without a network.
+        rate: learning rate of the network; NaN without one.
+    """
+
+    share: float
+    training: bool
+    stopped: str
+    disturbance: FloatArray
+    measured: FloatArray
+    torque: FloatArray
+    contact_force: FloatArray
+    mse: float
+    rate: float
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Telemetry:
     """What the controller thought on one tick: for the log, the report and the live view.
 
@@ -335,6 +365,7 @@ class Telemetry:
         tick_us: µs from the frame's arrival to the command's departure.
         deadline_misses: ticks so far, this one included, that took longer than the command period.
         plan: what preview and whole-body stage planned; None without them.
+        level: what the trunk-levelling compensator did; None without one.
     """
 
     time: float
@@ -348,6 +379,7 @@ class Telemetry:
     tick_us: float = 0.0
     deadline_misses: int = 0
     plan: PlanReport | None = None
+    level: LevelReport | None = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

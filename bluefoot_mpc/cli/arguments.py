@@ -99,11 +99,15 @@ class RunCommand(SimulationArguments):
     """Push: direction from forward, degrees, left positive."""
     push_time: Annotated[float | None, _Unset] = None
     """Push: time after the start, s."""
+    level: Annotated[str | None, tyro.conf.arg(metavar="{none,pd,narx}", help_behavior_hint="")] = None
+    """Trunk levelling: none, attitude feedback, or with the disturbance that a network predicts."""
+    level_mix: Annotated[float | None, _Unset] = None
+    """Trunk levelling: share of its goals in the goals, between 0 and 1 (0.25 unless given)."""
 
     def run_fields(self) -> dict[str, Any]:
         """Arguments by the names that RunOptions gives them."""
         names = ["robot", "controller", "duration", "view", "speed", "lateral_speed"]
-        names += ["yaw_rate", "impulse", "direction", "push_time"]
+        names += ["yaw_rate", "impulse", "direction", "push_time", "level", "level_mix"]
         return {**super().run_fields(), **{name: getattr(self, name) for name in names}}
 
 

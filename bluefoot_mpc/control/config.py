@@ -14,6 +14,7 @@ from bluefoot_mpc.control.servo_map import ServoMapConfig
 from bluefoot_mpc.control.tracking import TrackingConfig
 from bluefoot_mpc.estimation.config import EstimatorConfig
 from bluefoot_mpc.gait.config import GaitConfig
+from bluefoot_mpc.leveling.config import LevelingConfig
 from bluefoot_mpc.model.legs.ankle import AnkleConfig
 from bluefoot_mpc.zmp.placement import PlacementConfig
 from bluefoot_mpc.zmp.preview import PreviewConfig
@@ -35,4 +36,5 @@ class ControlConfig:
     push_recovery: PushRecoveryConfig = field(default_factory=PushRecoveryConfig)
     whole_body: BodyPlannerConfig = field(default_factory=BodyPlannerConfig)
     servo: ServoMapConfig = field(default_factory=ServoMapConfig)
+    leveling: LevelingConfig = field(default_factory=LevelingConfig)
     modes: ModeConfig = field(default_factory=ModeConfig)

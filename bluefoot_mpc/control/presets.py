@@ -14,6 +14,7 @@ from bluefoot_mpc.control.tracking import TrackingConfig
 from bluefoot_mpc.exceptions import UnknownNameError
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.tuned import LEG_LENGTH, TROT, WALK
+from bluefoot_mpc.leveling.config import LevelingConfig
 from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.zmp.preview.config import PreviewConfig, PreviewWeights
 from bluefoot_mpc.zmp.support import SupportConfig
@@ -43,6 +44,7 @@ def preset(name: str, robot: RobotParameters | None = None) -> ControlConfig:
             ground=GroundAdaptationConfig(enabled=True),
             whole_body=BodyPlannerConfig(enabled=True),
             servo=ServoMapConfig(mixing=0.6, back_emf=1.0),
+            leveling=LevelingConfig(form="residual"),
         )
     raise UnknownNameError("controller", name, CONTROLLERS)
 

@@ -89,6 +89,7 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
             raise ConfigurationError(f"{key} must be a table, not {value!r}")
     parameters = _parameters(table, options)
     table = merge({"control": to_table(preset(controller, parameters))}, table)
+    table = merge(table, _level_options(table, options))
     scenario_table = merge(table.get("scenario", {}), _scenario_options(scenario, options))
     made = scenario(build(scenario.Config, scenario_table, "scenario"))
     stages = build(StageConfig, {key: table[key] for key in stage_names if key in table})
@@ -143,6 +144,22 @@ def _scenario_options(scenario: type[Scenario], options: RunOptions) -> dict[str
             )
         values[key] = value
     return values
+
+
+def _level_options(table: dict[str, Any], options: RunOptions) -> dict[str, Any]:
+    """What the levelling options stand for in the configuration."""
+    chosen: dict[str, Any] = {}
+    if options.level is not None:
+        chosen["enabled"] = options.level != "none"
+    if options.level in ("pd", "narx"):
+        chosen |= {"attitude": True, "psi": "zero" if options.level == "pd" else "network"}
+    if options.level_mix is not None:
+        chosen["mix"] = options.level_mix
+        if not chosen.get("enabled", table["control"]["leveling"]["enabled"]):
+            raise ConfigurationError(
+                "--level-mix has no effect without levelling: add --level pd or --level narx"
+            )
+    return {"control": {"leveling": chosen}} if chosen else {}
 
 
 def _sim_options(options: RunOptions) -> dict[str, Any]:

@@ -12,6 +12,8 @@ from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 ROBOTS = ("sim",)
 RANDOMIZATIONS = ("none", "standard")
 GAITS = ("trot", "walk")
+LEVELS = ("none", "pd", "narx")
+"""No levelling, attitude feedback alone, and with the disturbance that the network predicts."""
 MAX_SEED = 2**63 - 1
 """Largest whole number that TOML and the log can hold."""
 
@@ -47,6 +49,8 @@ class RunOptions:
     impulse: float | None = None  # N·s
     direction: float | None = None  # degrees from forward, left positive
     push_time: float | None = None  # s
+    level: str | None = None  # trunk levelling, one of LEVELS
+    level_mix: float | None = None  # share of the levelling goals, between 0 and 1
 
     def __post_init__(self) -> None:
         _require_choice("robot", self.robot, ROBOTS)
@@ -55,6 +59,12 @@ class RunOptions:
         _require_choice("randomization", self.randomize, RANDOMIZATIONS)
         if self.gait is not None:
             _require_choice("gait", self.gait, GAITS)
+        if self.level is not None:
+            _require_choice("levelling", self.level, LEVELS)
+        if self.level_mix is not None and not 0.0 < self.level_mix < 1.0:
+            raise ConfigurationError(
+                f"--level-mix = {self.level_mix} must lie between 0 and 1, both excluded"
+            )
         for name in ("speed", "lateral_speed", "yaw_rate", "slope", "direction"):
             value = getattr(self, name)
             if value is not None and not math.isfinite(value):
