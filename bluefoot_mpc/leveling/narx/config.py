@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -28,12 +27,14 @@ class NarxConfig:
     gradient_bound: float = 20.0  # longer gradients are shortened to this norm; 0 = never, 1
     value_bound: float = 20.0  # scaled inputs and targets are clamped to ± this, 1
     weight_bound: float = 1e3  # norm of all weights from which the network counts as diverged, 1
-    error_bound: float = 10.0  # low-passed RMS error per output from which it counts as diverged, 1
+    error_bound: float = 3.0  # low-passed RMS error per output from which it counts as diverged, 1
 
     def __post_init__(self) -> None:
         """Check ranges."""
-        for name, count in (("hidden[0]", self.hidden[0]), ("hidden[1]", self.hidden[1])):
-            _require_count(name, count)
+        if len(self.hidden) != 2:
+            raise ConfigurationError(f"hidden = {self.hidden!r} must name the sizes of two layers")
+        for index, count in enumerate(self.hidden):
+            _require_count(f"hidden[{index}]", count)
         _require_count("delays", self.delays)
         if self.seed < 0:
             raise ConfigurationError(f"seed = {self.seed!r} must not be negative")
@@ -96,5 +97,5 @@ def low_pass(mse: float, square: float, weight: float) -> float:
 
 
 def _require_count(name: str, count: int) -> None:
-    if count < 1 or not math.isfinite(count):
+    if count < 1:
         raise ConfigurationError(f"{name} = {count!r} must be at least 1")

@@ -77,7 +77,7 @@ class Narx:
         self._nothing = np.zeros(ny)
         self._nothing.setflags(write=False)
         self._mse_bound = ny * config.error_bound**2
-        self._rate, self._mse = config.rate, 0.0
+        self._rate, self._mse, self._power = config.rate, 0.0, 0.0
         self._diverged = self._waiting = False
         self.reset()
 
@@ -86,7 +86,7 @@ class Narx:
         self._use(self._first)
 
     def forget(self) -> None:
-        """Empty the delay lines; weights, rate, MSE and a divergence stay."""
+        """Empty the delay lines; weights, rate, MSE, power and a divergence stay."""
         self._perceptron.inputs[:] = 0.0
         self._perceptron.output[:] = 0.0
         self._fed_back[:] = 0.0
@@ -96,6 +96,11 @@ class Narx:
     def mse(self) -> float:
         """Low-passed |e|² over all outputs, in scaled units; it starts from 0."""
         return self._mse
+
+    @property
+    def power(self) -> float:
+        """Low-passed |ψ|², the MSE of who always says zero: an `mse` above it is worse than nothing."""
+        return self._power
 
     @property
     def rate(self) -> float:
@@ -188,9 +193,10 @@ class Narx:
         if not self._waiting:
             return NarxStatus.IDLE
         self._waiting = False
-        error, before = self._error, self._mse
-        np.subtract(self._perceptron.output, self._targets.value, out=error)
+        error, before, scaled = self._error, self._mse, self._targets.value
+        np.subtract(self._perceptron.output, scaled, out=error)
         self._mse = low_pass(before, float(np.dot(error, error)), self.config.mse_weight)
+        self._power = low_pass(self._power, float(np.dot(scaled, scaled)), self.config.mse_weight)
         self._diverged = not self._mse < self._mse_bound
         if learn and not self._diverged:
             self._rate = bold_driver(self._rate, self._mse > before, self.config)
@@ -217,7 +223,7 @@ class Narx:
     def _use(self, flat: FloatArray) -> None:
         self._perceptron.weights[:] = flat
         self._rate = self.config.rate
-        self._mse = 0.0
+        self._mse = self._power = 0.0
         self._diverged = False
         self.forget()
 

@@ -85,6 +85,8 @@ def check_scale(name: str, scale: FloatArray) -> None:
         raise ConfigurationError(
             f"{name} must be a vector with one scale per signal, not of shape {scale.shape}"
         )
+    if scale.dtype.kind not in "fiu":
+        raise ConfigurationError(f"{name} must be numbers, not {scale.dtype}")
     # Also the inverse, by which signals are multiplied, must be a number.
     bad = np.flatnonzero(~((scale > 1e-100) & (scale < 1e100)))
     if bad.size:

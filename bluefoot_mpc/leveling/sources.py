@@ -1,0 +1,169 @@
+"""Where the disturbance ψ of the coming period comes from; one class per choice, one interface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from bluefoot_mpc.leveling.config import LevelingConfig
+from bluefoot_mpc.leveling.narx import Narx, load_weights
+from bluefoot_mpc.leveling.signals import INPUT_SCALE, OUTPUT_SCALE, OUTPUTS
+from bluefoot_mpc.model.dynamics import Dynamics
+from bluefoot_mpc.types import FloatArray
+
+NOTHING: FloatArray = np.zeros(OUTPUTS)
+NOTHING.setflags(write=False)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Situation:
+    """What a source may look at on one tick.
+
+    Attributes:
+        target: (22,) ψ_k measured over the period that just ended; None where it is unknown.
+        inputs: (56,) u_k of the network.
+        q: (23,) configuration; position, quaternion x y z w, joints.
+        v: (22,) velocity.
+        forces: (4, 3) N, estimated ground forces, world axes.
+        learn: whether a source that learns may.
+    """
+
+    target: FloatArray | None
+    inputs: FloatArray
+    q: FloatArray
+    v: FloatArray
+    forces: FloatArray
+    learn: bool
+
+
+class Source(Protocol):
+    """Predicts ψ of the coming period.
+
+    Attributes:
+        mse: low-passed squared error, NaN where nothing learns.
+        rate: learning rate, NaN where nothing learns.
+        ready: False while a prediction is not to be used yet.
+        fault: why predictions can no longer be used; empty while they can.
+    """
+
+    mse: float
+    rate: float
+    ready: bool
+    fault: str
+
+    def reset(self) -> None:
+        """Forget everything."""
+
+    def step(self, situation: Situation, dt: float) -> FloatArray | None:
+        """(22,) N and N·m, predicted ψ, base frame and joints; None where there is none."""
+
+
+class _Plain:
+    """What sources without a network have in common."""
+
+    mse = math.nan
+    rate = math.nan
+    ready = True
+    fault = ""
+
+    def reset(self) -> None:
+        """Nothing is remembered."""
+
+
+class Zero(_Plain):
+    """No disturbance: the attitude part alone is left of the law."""
+
+    def step(self, situation: Situation, dt: float) -> FloatArray | None:
+        """(22,) zeros."""
+        return NOTHING
+
+
+class Persistence(_Plain):
+    """The coming disturbance is the last one measured."""
+
+    def step(self, situation: Situation, dt: float) -> FloatArray | None:
+        """(22,) ψ_k."""
+        return situation.target
+
+
+class ModelDisturbance(_Plain):
+    """The disturbance that Pinocchio's model and the estimated ground forces give: Jᵀ f̂ - C v - G.
+
+    Args:
+        dynamics: the robot.
+    """
+
+    def __init__(self, dynamics: Dynamics) -> None:
+        self._dynamics = dynamics
+
+    def step(self, situation: Situation, dt: float) -> FloatArray | None:
+        """(22,) of the present state."""
+        dynamics, q = self._dynamics, situation.q
+        force = -dynamics.bias(q, situation.v)
+        if situation.forces.any():
+            jacobians = dynamics.foot_jacobians(q)
+            force += situation.forces.ravel() @ jacobians.reshape(-1, OUTPUTS)
+        return force
+
+
+class Network:
+    """The NARX network: learns ψ while it may, predicts it always.
+
+    Attributes:
+        mse: low-passed squared error, scaled units.
+        rate: learning rate.
+        ready: True with loaded weights, or once it has learnt for long enough.
+        fault: why it is out of use; empty while it is not.
+
+    Args:
+        config: of the compensator.
+
+    Raises:
+        ConfigurationError: the weights' file does not fit.
+    """
+
+    def __init__(self, config: LevelingConfig) -> None:
+        self._narx = Narx(config.narx, INPUT_SCALE, OUTPUT_SCALE)
+        self._weights = load_weights(Path(config.weights)) if config.weights else None
+        self._learn_time = config.schedule.learn_time
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the first weights."""
+        self._narx.reset()
+        if self._weights is not None:
+            self._narx.load_weights(self._weights)
+        self._learnt = 0.0
+        self._note()
+
+    @property
+    def narx(self) -> Narx:
+        """The network itself, to save its weights."""
+        return self._narx
+
+    def step(self, situation: Situation, dt: float) -> FloatArray | None:
+        """(22,) predicted ψ; None after a bad input, or once the network has diverged."""
+        if situation.target is not None:
+            self._narx.train(situation.target, learn=situation.learn)
+            self._learnt += dt if situation.learn else 0.0
+        prediction = self._narx.predict(situation.inputs)
+        self._note()
+        return prediction.value if prediction.valid else None
+
+    def _note(self) -> None:
+        self.mse, self.rate = self._narx.mse, self._narx.rate
+        self.ready = self._weights is not None or self._learnt >= self._learn_time - 1e-9
+        self.fault = "the network has diverged" if self._narx.diverged else ""
+
+
+def make_source(config: LevelingConfig, dynamics: Dynamics) -> Source:
+    """The source that a configuration names."""
+    if config.psi == "network":
+        return Network(config)
+    if config.psi == "model":
+        return ModelDisturbance(dynamics)
+    return Persistence() if config.psi == "persistence" else Zero()
