@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.control.names import DEFAULT_CONTROLLER
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
@@ -60,12 +61,14 @@ class Scenario(ABC):
     Attributes:
         name: what it is called on the command line.
         Config: its configuration.
+        default_controller: what decides where nobody chooses.
         config: the configuration in force.
         world: the world that it runs in, for criteria that depend on the ground.
     """
 
     name: ClassVar[str]
     Config: ClassVar[type[ScenarioConfig]] = ScenarioConfig
+    default_controller: ClassVar[str] = DEFAULT_CONTROLLER
 
     config: Any
     world: WorldConfig = WorldConfig()
@@ -76,6 +79,17 @@ class Scenario(ABC):
     @abstractmethod
     def command(self, time: float) -> MotionCommand:
         """The wanted motion at `time` (s since the start)."""
+
+    def control(self, controller: str) -> Mapping[str, Any]:
+        """What of the controller's configuration this scenario changes; by default nothing.
+
+        A nested table, on top of the controller's preset and under what the user
+        asks for, by file or by override.
+
+        Args:
+            controller: name of the controller.
+        """
+        return {}
 
     def prepare(self, sim: SimConfig) -> SimConfig:
         """The simulator's configuration for this scenario; by default unchanged."""

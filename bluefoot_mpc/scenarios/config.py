@@ -71,7 +71,7 @@ class Resolved:
 
 
 def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
-    """Put defaults, the configuration file, overrides and options together, in rising rank.
+    """Put preset, the scenario's own, configuration file, overrides and options together, in rising rank.
 
     Raises:
         ConfigurationError: a key is unknown, or a value impossible.
@@ -79,7 +79,7 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
     table = read_toml(options.config) if options.config is not None else {}
     for override in options.overrides:
         table = merge(table, parse_override(override))
-    controller = _controller(table, options)
+    controller = _controller(table, options, scenario.default_controller)
     table = _without_run(table)
     stage_names = [f.name for f in fields(StageConfig)]
     for key, value in table.items():
@@ -88,10 +88,11 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
         if not isinstance(value, Mapping):
             raise ConfigurationError(f"{key} must be a table, not {value!r}")
     parameters = _parameters(table, options)
-    table = merge({"control": to_table(preset(controller, parameters))}, table)
-    table = merge(table, _level_options(table, options))
     scenario_table = merge(table.get("scenario", {}), _scenario_options(scenario, options))
     made = scenario(build(scenario.Config, scenario_table, "scenario"))
+    control = merge(to_table(preset(controller, parameters)), made.control(controller))
+    table = merge({"control": control}, table)
+    table = merge(table, _level_options(table, options))
     stages = build(StageConfig, {key: table[key] for key in stage_names if key in table})
     sim = build(SimConfig, merge(to_table(stages.sim), _sim_options(options)), "sim")
     made.world = sim.world
@@ -103,8 +104,8 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
     )
 
 
-def _controller(table: dict[str, Any], options: RunOptions) -> str:
-    """The controller that is asked for, or the one whose configuration the file holds."""
+def _controller(table: dict[str, Any], options: RunOptions, default: str) -> str:
+    """The controller that is asked for, or the one whose configuration the file holds, or the scenario's."""
     run = table.get("run", {})
     named = run.get("controller") if isinstance(run, Mapping) else None
     if named is not None and named not in CONTROLLERS:
@@ -114,7 +115,7 @@ def _controller(table: dict[str, Any], options: RunOptions) -> str:
             f"{options.config} holds the configuration of the controller '{named}': "
             f"leave --controller {options.controller} out, or take a file without [control]"
         )
-    return options.controller or named or DEFAULT_CONTROLLER
+    return options.controller or named or default
 
 
 def _without_run(table: dict[str, Any]) -> dict[str, Any]:

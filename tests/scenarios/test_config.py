@@ -19,7 +19,7 @@ def test_every_scenario_resolves_and_survives_a_round_trip_through_its_file(tmp_
             "scenario": scenario.name,
             "seed": 3,
             "robot": "sim",
-            "controller": "mpc",
+            "controller": scenario.default_controller,
         }
         file = tmp_path / f"{scenario.name}.toml"
         file.write_text(text)
