@@ -56,7 +56,7 @@ class Narx:
         output_scale: (ny,) the same of the outputs.
 
     Raises:
-        ConfigurationError: a scale is not finite and positive.
+        ConfigurationError: a scale is not finite and positive, or the first weights are too large.
     """
 
     def __init__(self, config: NarxConfig, input_scale: FloatArray, output_scale: FloatArray) -> None:
@@ -72,6 +72,7 @@ class Narx:
         # Newest sample first: the older ones move back by one sample.
         self._input_line, self._output_line = line[: n * nu], line[n * nu :]
         self._first = random_weights(sizes, config.weight_scale, np.random.default_rng(config.seed))
+        _check_norm("first weights", self._first, config, "lower weight_scale")
         self._fed_back = np.zeros(ny)
         self._error = np.zeros(ny)
         self._nothing = np.zeros(ny)
@@ -145,12 +146,7 @@ class Narx:
         _check_same("input_scale", weights.input_scale, self._inputs.scale)
         _check_same("output_scale", weights.output_scale, self._targets.scale)
         flat = np.concatenate([layer.ravel() for layer in weights.layers])
-        norm = float(np.linalg.norm(flat))
-        if not norm < config.weight_bound:
-            raise ConfigurationError(
-                f"weights of norm {norm:g} count as diverged, wanted is less than weight_bound = "
-                f"{config.weight_bound:g}; raise the bound or train anew"
-            )
+        _check_norm("weights", flat, config, "train anew")
         self._use(flat)
 
     def predict(self, inputs: FloatArray) -> Prediction:
@@ -274,4 +270,13 @@ def _check_same(name: str, found: FloatArray, wanted: FloatArray) -> None:
         raise ConfigurationError(
             f"weights were trained with {name}[{index}] = {found[index]:g}, the network has "
             f"{wanted[index]:g}; give it the same scales or train anew"
+        )
+
+
+def _check_norm(name: str, flat: FloatArray, config: NarxConfig, way_out: str) -> None:
+    norm = float(np.linalg.norm(flat))
+    if not norm < config.weight_bound:
+        raise ConfigurationError(
+            f"{name} of norm {norm:g} count as diverged, wanted is less than "
+            f"weight_bound = {config.weight_bound:g}; raise the bound or {way_out}"
         )

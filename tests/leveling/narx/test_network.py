@@ -259,7 +259,7 @@ def test_values_are_clamped():
         {"rate": 0.3, "rate_max": 0.5},
         {"rate": 0.3, "rate_max": 0.5, "gradient_bound": 20.0, "error_bound": 1.2},
         {"rate": 1e300, "rate_max": 1e301},
-        {"weight_bound": 7.0, "rate": 0.03},
+        {"weight_bound": 12.0, "error_bound": 1e3},
     ],
 )
 def test_divergence_is_flagged_and_ends_with_a_reset(values):
@@ -322,6 +322,13 @@ def test_bad_scales_are_named(bad):
         Narx(NarxConfig(), np.array([bad, 1.0]), OUTPUT_SCALE)
     with pytest.raises(ConfigurationError, match="input_scale must be a vector"):
         Narx(NarxConfig(), np.zeros(0), OUTPUT_SCALE)
+
+
+def test_first_weights_that_count_as_diverged_are_refused():
+    with pytest.raises(
+        ConfigurationError, match=r"first weights .* weight_bound = 1000; .* lower weight_scale"
+    ):
+        make(weight_scale=3000.0)
 
 
 def test_signals_of_another_size_are_refused():

@@ -133,7 +133,7 @@ def test_a_file_that_does_not_fit_names_cause_and_way_out(path, changes, words):
         ({"output_scale": np.ones(1)}, ("outputs = 2", "has 1")),
         ({"input_scale": np.array([0.02, 2.0, 10.0])}, ("input_scale[1] = 1", "has 2")),
         ({"output_scale": np.array([5.0, 0.2])}, ("output_scale[1] = 0.1", "has 0.2")),
-        ({"weight_bound": 0.5}, ("weight_bound = 0.5", "diverged")),
+        ({"weight_bound": 0.5, "weight_scale": 0.01}, ("weight_bound = 0.5", "diverged")),
     ],
 )
 def test_weights_of_another_network_name_found_and_wanted(path, network, words):
