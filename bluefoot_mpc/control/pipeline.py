@@ -2,7 +2,7 @@
 
 sensors -> estimation -> modes -> tracking -> gait and footholds -> ground plane
 -> trunk placement (static law or preview) -> inverse kinematics -> whole-body
-problem -> servo mapping -> joint goals.
+problem -> servo mapping -> trunk levelling -> joint goals.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from bluefoot_mpc.control.config import ControlConfig
 from bluefoot_mpc.control.gait_sway import GaitSway
 from bluefoot_mpc.control.ground import GroundAdapter
 from bluefoot_mpc.control.leg_masses import LegMasses
+from bluefoot_mpc.control.leveling import LevelStage, LevelWish, recorded_gait
 from bluefoot_mpc.control.planned_body import PlannedBody
 from bluefoot_mpc.control.preview_sway import PreviewSway
 from bluefoot_mpc.control.push_recovery import PushRecovery
@@ -35,6 +36,7 @@ from bluefoot_mpc.types import (
     BodyState,
     FloatArray,
     JointCommand,
+    LevelReport,
     Mode,
     MotionCommand,
     PostureReference,
@@ -73,7 +75,8 @@ class Pipeline:
         stance = posture.stance(robot.parameters.stance, config.posture)
         imu = replace(config.estimator.imu, mount=robot.parameters.sensors.imu)
         self._estimator = Estimator(geometry, replace(config.estimator, imu=imu))
-        self._gait = Gait(config.gait, stance.feet, posture.style(stance, config.posture, config.servo))
+        style = posture.style(stance, config.posture, config.servo)
+        self._gait = Gait(config.gait, stance.feet, style)
         self._targets = JointTargets(geometry, config.ankle)
         self._trunk = TrunkPlanner(stance, config.posture, self._sway, self._targets.reach)
         self._body = PlannedBody(robot.parameters.servo)
@@ -82,6 +85,7 @@ class Pipeline:
         self._recovery = PushRecovery(config.push_recovery)
         self._step_back = plans.StepBack()
         self._require_reachable()
+        self._level = self._level_stage(Gait(config.gait, stance.feet, style))
         self.reset()
 
     def reset(self) -> None:
@@ -95,6 +99,8 @@ class Pipeline:
             self._planner.reset()
         self._ground.reset()
         self._recovery.reset()
+        if self._level is not None:
+            self._level.reset()
         self._told = np.zeros(2)
         self._modes = modes.ModeState()
         self._tracking = tracking.TrackingState()
@@ -133,6 +139,7 @@ class Pipeline:
         joints, cut = self._targets.step(reference, frame, dt, gait.style.ankle_shift)
         plan = self._planned(gait, reference, joints, frame)
         goals = self._goals(gait.style, joints, plan, frame)
+        goals, level, leveling = self._leveled(goals, frame, estimate)
         planned = plans.report(self._trunk.plan, plan)
         self._step_back.step(planned, dt)
         command = JointCommand(
@@ -140,7 +147,8 @@ class Pipeline:
         )
         telemetry = Telemetry(
             time=frame.time, mode=self._modes.mode, motion=motion, estimate=estimate, phase=gait.phase,
-            reference=reference, zmp=zmp, events=begun + held + cut + changed, plan=planned,
+            reference=reference, zmp=zmp, events=begun + held + cut + changed + leveling,
+            plan=planned, level=level,
         )  # fmt: skip
         return ControlOutput(command=command, telemetry=telemetry)
 
@@ -150,6 +158,13 @@ class Pipeline:
         if "preview" in (config.sway.trot, config.sway.walk):
             preview = PreviewSway(masses, config.preview, joints_in_stance, self._gait.schedule)
         return GaitSway(config.sway, Sway(masses, config.zmp, joints_in_stance), preview)
+
+    def _level_stage(self, gait: Gait) -> LevelStage | None:
+        if not self.config.leveling.enabled:
+            return None
+        stance = self._trunk.over_stance(np.zeros(6))
+        joints = recorded_gait(gait, stance, self._targets.reach)
+        return LevelStage(self._robot, self.config.leveling, joints)
 
     def _rotation_base_to_virtual(self, estimate: BodyState) -> FloatArray:
         """(3, 3) rotation from the base frame to b': estimated tilt, commanded yaw of the trunk."""
@@ -250,11 +265,28 @@ class Pipeline:
         """(16,) rad, goals that run ahead of `joints` by what torque and speed take."""
         if plan is None or style.mixing == style.back_emf == 0.0:
             return joints
-        servo, geometry = self._robot.parameters.servo, self._robot.geometry
+        servo = self._robot.parameters.servo
         feed = servo_map.Feed(
             torque=style.mixing * plan.torque, speed=style.back_emf * self._body.joint_speed
         )
         goals = servo_map.goals(servo, joints, feed, self._voltage(frame), self.config.servo)
+        return self._within_limits(goals)
+
+    def _leveled(
+        self, goals: FloatArray, frame: SensorFrame, estimate: BodyState
+    ) -> tuple[FloatArray, LevelReport | None, tuple[str, ...]]:
+        """The goals with the levelling in them, its account, and its events."""
+        if self._level is None:
+            return goals, None, ()
+        wish = LevelWish(
+            tilt=self._trunk.tilt, heading=self._tracking.heading + self._trunk.yaw,
+            walking=self._walking and self._targets.started, voltage=self._voltage(frame),
+        )  # fmt: skip
+        leveled, events = self._level.step(goals, frame, estimate, wish, self.period)
+        return self._within_limits(leveled.goals), leveled.report, events
+
+    def _within_limits(self, goals: FloatArray) -> FloatArray:
+        geometry = self._robot.geometry
         return np.minimum(np.maximum(goals, geometry.physical_lower), geometry.physical_upper)
 
     def _voltage(self, frame: SensorFrame) -> float:

@@ -82,6 +82,11 @@ class TrunkPlanner:
         self.tilt_rate = np.zeros(2)
 
     @property
+    def tilt(self) -> FloatArray:
+        """(2,) rad, commanded roll and pitch in force."""
+        return self._pose[3:5]
+
+    @property
     def plan(self) -> ComPlan | None:
         """The preview's plan of the last tick; None without a preview."""
         return self._sway.plan

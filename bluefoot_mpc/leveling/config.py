@@ -54,13 +54,14 @@ class ScheduleConfig:
 class LevelingLimits:
     """What keeps a wrong prediction from throwing the robot."""
 
-    shift: float = 0.6  # rad, furthest that a goal is moved from the gait's own
+    disturbance: float = 150.0  # rad/s², largest angular acceleration that is believed of ψ, each axis
+    shift: float = 0.3  # rad, furthest that a goal is moved from the gait's own
     tilt_deg: float = 20.0  # degrees, tilt beyond which it lets go: the robot was pushed or falls
     clamped: float = 0.5  # s in a row with half of the goals at the limit, after which it disengages
 
     def __post_init__(self) -> None:
         """Check ranges."""
-        require_positive(shift=self.shift, clamped=self.clamped)
+        require_positive(disturbance=self.disturbance, shift=self.shift, clamped=self.clamped)
         require_range(0.0, 45.0, tilt_deg=self.tilt_deg)
 
 

@@ -29,4 +29,5 @@ def contact_forces(mass: float, force: FloatArray, contact: BoolArray) -> FloatA
     touching = int(np.count_nonzero(contact))
     if touching == 0:
         return np.zeros((N_LEGS, 3))
-    return np.multiply.outer(contact.astype(float), (mass / touching) * force)
+    shared: FloatArray = np.multiply.outer(contact.astype(float), (mass / touching) * force)
+    return shared

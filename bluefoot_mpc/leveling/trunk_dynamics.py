@@ -36,7 +36,7 @@ class TrunkDynamics:
         Raises:
             ConfigurationError: joints and trunk are not coupled in it, so that no torque turns the trunk.
         """
-        from_force = np.linalg.inv(mass)[_ANGULAR]
+        from_force: FloatArray = np.asarray(np.linalg.inv(mass)[_ANGULAR], dtype=np.float64)
         from_torque = from_force[:, -N_JOINTS:]
         square = from_torque @ from_torque.T
         if not np.linalg.cond(square) < 1e9:

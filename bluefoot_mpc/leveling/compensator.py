@@ -1,0 +1,202 @@
+"""The trunk-levelling compensator: find the torque against a predicted disturbance, mix it into the goals.
+
+Paper, section on the NARX compensator, with the sign of the training target
+corrected (errata, item 10).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bluefoot_mpc.geometry import rotation_from_quaternion
+from bluefoot_mpc.leveling import schedule
+from bluefoot_mpc.leveling.config import LevelingConfig
+from bluefoot_mpc.leveling.contact_force import contact_forces
+from bluefoot_mpc.leveling.guard import Guard
+from bluefoot_mpc.leveling.servo_torque import ServoTorque
+from bluefoot_mpc.leveling.signals import LevelingInputs, network_inputs, velocity
+from bluefoot_mpc.leveling.sources import NOTHING, Situation, Source, make_source
+from bluefoot_mpc.leveling.trunk_dynamics import TrunkDynamics, disturbance, nominal_mass_matrix
+from bluefoot_mpc.model.dynamics import Dynamics
+from bluefoot_mpc.model.robot import RobotModel
+from bluefoot_mpc.types import N_LEGS, BodyState, FloatArray, LevelReport
+
+_UNKNOWN: FloatArray = np.full(3, np.nan)
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Leveled:
+    """What one tick gives.
+
+    Attributes:
+        goals: (16,) rad, joint goals with the levelling in them.
+        report: the compensator's account of the tick.
+    """
+
+    goals: FloatArray
+    report: LevelReport
+
+
+class Compensator:
+    """Levels the trunk through the joint goals.
+
+    Args:
+        robot: the model.
+        config: parts, gains, schedule and limits.
+        gait_joints: (n, 16) rad, joints over whole cycles of a gait, over which
+            the nominal mass matrix is averaged.
+
+    Raises:
+        ConfigurationError: the network's weights do not fit.
+    """
+
+    def __init__(self, robot: RobotModel, config: LevelingConfig, gait_joints: FloatArray) -> None:
+        self._config = config
+        self._servo = robot.parameters.servo
+        self._dynamics = Dynamics(robot, rotor_inertia=True)
+        self._nominal = TrunkDynamics.of(nominal_mass_matrix(self._dynamics, gait_joints))
+        height = robot.parameters.stance.trunk_height
+        self._neutral = np.concatenate([[0.0, 0.0, height], robot.stance_joints])
+        self._made = ServoTorque(self._servo, config.delay_ticks)
+        self._source: Source = make_source(config, self._dynamics)
+        self._guard = Guard(config.limits)
+        gains = config.gains
+        self._tilt_gain = np.array([gains.tilt, gains.tilt, gains.heading])
+        self._rate_gain = np.array([gains.tilt_rate, gains.tilt_rate, gains.heading_rate])
+        self.reset()
+
+    @property
+    def source(self) -> Source:
+        """Where the disturbance comes from."""
+        return self._source
+
+    def reset(self) -> None:
+        """Forget everything, what the network has learnt included: the state after ``__init__``."""
+        self._made.reset()
+        self._source.reset()
+        self._guard.reset()
+        self._share = 0.0
+        self._before: FloatArray | None = None
+
+    def step(self, inputs: LevelingInputs, dt: float) -> Leveled:
+        """One tick.
+
+        Args:
+            inputs: estimate, goals and what was measured.
+            dt: s, since the last tick.
+        """
+        estimate = inputs.estimate
+        speed = velocity(estimate)
+        q = np.concatenate([estimate.position, estimate.quaternion, estimate.joint_position])
+        dynamics = self._mass(q, estimate)
+        target = self._measured(dynamics, inputs, speed, dt)
+        learning = inputs.walking and schedule.may_learn(self._share, self._config.schedule)
+        situation = self._situation(inputs, q, speed, target, learn=learning)
+        predicted = self._source.step(situation, dt)
+        self._engage(inputs, predicted, dt)
+        psi = self._bounded(dynamics, predicted)
+        torque = self._torque(dynamics, inputs, psi)
+        goals = self._mixed(inputs, torque, dt)
+        self._made.send(goals)
+        self._before = speed if np.isfinite(speed).all() else None
+        report = LevelReport(
+            share=self._share, training=learning and target is not None and self._learns,
+            stopped=self._guard.stopped, disturbance=psi,
+            measured=_UNKNOWN if target is None else dynamics.from_force @ target,
+            torque=torque, contact_force=situation.forces,
+            mse=self._source.mse, rate=self._source.rate,
+        )  # fmt: skip
+        return Leveled(goals=goals, report=report)
+
+    @property
+    def _learns(self) -> bool:
+        return self._config.psi == "network" and not self._source.fault
+
+    def _mass(self, q: FloatArray, estimate: BodyState) -> TrunkDynamics:
+        """The nominal mass matrix, or the model's at this state."""
+        if self._config.mass_matrix == "nominal" or not np.isfinite(q).all():
+            return self._nominal
+        return TrunkDynamics.of(self._dynamics.mass_matrix(q))
+
+    def _measured(
+        self, dynamics: TrunkDynamics, inputs: LevelingInputs, speed: FloatArray, dt: float
+    ) -> FloatArray | None:
+        """(22,) ψ of the period that just ended; None where a part of it is unknown."""
+        estimate = inputs.estimate
+        torque = self._made.torque(estimate.joint_position, estimate.joint_velocity, inputs.voltage)
+        if torque is None or self._before is None:
+            return None
+        target = disturbance(dynamics.mass, self._before, speed, torque, dt)
+        return target if np.isfinite(target).all() else None
+
+    def _situation(
+        self,
+        inputs: LevelingInputs,
+        q: FloatArray,
+        speed: FloatArray,
+        target: FloatArray | None,
+        *,
+        learn: bool,
+    ) -> Situation:
+        estimate = inputs.estimate
+        rotation = rotation_from_quaternion(estimate.quaternion)
+        forces = np.zeros((N_LEGS, 3))
+        if inputs.specific_force is not None:
+            forces = contact_forces(self._dynamics.mass, rotation @ inputs.specific_force, estimate.contact)
+        return Situation(
+            target=target, q=q, v=speed, forces=forces, learn=learn,
+            inputs=network_inputs(inputs, rotation, self._neutral, speed, forces),
+        )  # fmt: skip
+
+    def _engage(self, inputs: LevelingInputs, predicted: FloatArray | None, dt: float) -> None:
+        """Let schedule, source and guard decide how far to act."""
+        estimate, config = inputs.estimate, self._config.schedule
+        tilt = math.hypot(*(estimate.rpy[:2] - inputs.tilt_reference).tolist())
+        healthy = estimate.healthy and math.isfinite(tilt)
+        if inputs.walking:
+            usable = healthy and (predicted is not None or not self._source.ready)
+            self._guard.watch(usable, tilt, self._source.fault, dt)
+        wanted = inputs.walking and schedule.wants_on(estimate.time, config) and self._source.ready
+        self._share = schedule.faded(self._share, wanted and not self._guard.stopped, dt, config)
+        if not healthy or predicted is None:
+            self._share = 0.0  # Nothing to act on, not even while it fades.
+
+    def _bounded(self, dynamics: TrunkDynamics, predicted: FloatArray | None) -> FloatArray:
+        """(3,) rad/s², angular acceleration Γ1 M̂⁻¹ ψ̂ of the trunk within its bound."""
+        if predicted is None or predicted is NOTHING:
+            return np.zeros(3)
+        most = self._config.limits.disturbance
+        turned: FloatArray = dynamics.from_force @ predicted
+        return np.minimum(np.maximum(turned, -most), most)
+
+    def _torque(self, dynamics: TrunkDynamics, inputs: LevelingInputs, psi: FloatArray) -> FloatArray:
+        """(16,) N·m, levelling torque τ̂ = -[Γ1 M̂⁻¹ Γ2]† [Γ1 M̂⁻¹ ψ̂ + K_b θ + K_d dθ/dt]."""
+        config, estimate = self._config, inputs.estimate
+        unwanted = psi
+        if config.attitude:
+            roll, pitch = (estimate.rpy[:2] - inputs.tilt_reference).tolist()
+            tilt = np.array([roll, pitch, inputs.heading_error])
+            unwanted = unwanted + self._tilt_gain * tilt + self._rate_gain * estimate.angular_velocity
+        if config.form == "residual" and config.psi != "zero":
+            # The controller's goals make torque already: what they do about ψ is not to be done twice.
+            ahead = inputs.goals - estimate.joint_position
+            torque = self._servo.stiffness * ahead - self._servo.back_emf * estimate.joint_velocity
+            unwanted = unwanted + dynamics.from_torque @ torque
+        return -(dynamics.to_torque @ unwanted)
+
+    def _mixed(self, inputs: LevelingInputs, torque: FloatArray, dt: float) -> FloatArray:
+        """(16,) rad, goals with the levelling mixed in: (1-α) q_r + α (q + τ̂/k_s), or q_r + α τ̂/k_s."""
+        if self._share <= _ROUNDING:
+            return inputs.goals
+        share = self._config.mix * self._share
+        ahead = torque * (self._servo.nominal_voltage / (self._servo.stiffness * inputs.voltage))
+        if self._config.form == "mixed":
+            ahead = ahead + inputs.estimate.joint_position - inputs.goals
+        shift = share * ahead
+        if not np.isfinite(shift).all():
+            return inputs.goals
+        return inputs.goals + self._guard.cut(shift, dt)
