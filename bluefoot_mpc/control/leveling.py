@@ -1,4 +1,4 @@
-"""Trunk levelling in the pipeline: what the compensator sees of it, and over which gait masses are averaged."""
+"""Trunk levelling in the pipeline: what it is given there, and over which gait masses are averaged."""
 
 from __future__ import annotations
 
