@@ -80,7 +80,8 @@ class RunCommand(SimulationArguments):
     robot: Annotated[str, tyro.conf.arg(metavar="{sim}")] = "sim"
     """What to run on."""
     controller: Annotated[
-        str | None, tyro.conf.arg(metavar="{cpg,mpc}", help_behavior_hint=f"(default: {DEFAULT_CONTROLLER})")
+        str | None,
+        tyro.conf.arg(metavar="{cpg,mpc}", help_behavior_hint=f"(default: {DEFAULT_CONTROLLER}; level: cpg)"),
     ] = None
     """What decides."""
     duration: Annotated[float | None, _Unset] = None
@@ -99,7 +100,10 @@ class RunCommand(SimulationArguments):
     """Push: direction from forward, degrees, left positive."""
     push_time: Annotated[float | None, _Unset] = None
     """Push: time after the start, s."""
-    level: Annotated[str | None, tyro.conf.arg(metavar="{none,pd,narx}", help_behavior_hint="")] = None
+    level: Annotated[
+        str | None,
+        tyro.conf.arg(metavar="{none,pd,narx}", help_behavior_hint="(default: none; level: narx)"),
+    ] = None
     """Trunk levelling: none, attitude feedback, or with the disturbance that a network predicts."""
     level_mix: Annotated[float | None, _Unset] = None
     """Trunk levelling: share of its goals in the goals, between 0 and 1 (0.25 unless given)."""

@@ -12,6 +12,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from bluefoot_mpc.cli.level_page import LEVEL_FIGURES, level_table
 from bluefoot_mpc.runtime.loop import INTERRUPTED
 from bluefoot_mpc.scenarios import Criterion
 
@@ -58,7 +59,11 @@ def summary_page(
     heading = Text.assemble((_title(summary), "bold"), "\n")
     happened = [event for event in events if not _CHANGE.match(event[1])]
     told = (_events(happened),) if happened else ()
-    return (heading, _table(_rows(summary)), _verdict(summary, criteria), *told, _files(folder))
+    level = level_table(summary.get("figures") or {})
+    tables = [_table(_rows(summary, () if level is None else LEVEL_FIGURES))]
+    if level is not None:
+        tables.append(level)
+    return (heading, *tables, _verdict(summary, criteria), *told, _files(folder))
 
 
 def _events(events: Sequence[tuple[float, str]]) -> Text:
@@ -84,7 +89,8 @@ def _title(summary: Summary) -> str:
     return ", ".join(part for part in parts if part)
 
 
-def _rows(summary: Summary) -> list[Row]:
+def _rows(summary: Summary, elsewhere: Sequence[str]) -> list[Row]:
+    """Key figures; the scenario's own come last, but for those that are shown elsewhere."""
     get = summary.get
     tick = get("tick_us") or {}
     rows: list[Row] = [
@@ -102,7 +108,7 @@ def _rows(summary: Summary) -> list[Row]:
         ("simulation", _scaled(get("real_time_factor"), 1.0, 1, "x real time"), ""),
     ]
     figures = (get("figures") or {}).items()
-    rows += [_figure_row(name, value) for name, value in figures if name not in _NOT_SHOWN]
+    rows += [_figure_row(name, value) for name, value in figures if name not in (*_NOT_SHOWN, *elsewhere)]
     return [row for row in rows if row[1] != _NONE]
 
 

@@ -133,7 +133,7 @@ def _reduced(found: Mapping[str, Any], axis: str, least: float, name: str) -> Cr
     value = seen.get(axis)
     detail = "not measured"
     if value is not None:
-        detail = f"{-value:+.0f} % ({off[f'{axis}_rms_deg']:.2f}° to {on[f'{axis}_rms_deg']:.2f}°)"
+        detail = f"{-value:+.1f} % ({off[f'{axis}_rms_deg']:.2f}° to {on[f'{axis}_rms_deg']:.2f}°)"
     return Criterion(name=name, holds=value is not None and value >= least, detail=detail)
 
 
