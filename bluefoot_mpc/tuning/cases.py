@@ -6,7 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.runtime import metrics
+from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.runtime.summary import summarize
 from bluefoot_mpc.scenarios import RunOptions
 from bluefoot_mpc.scenarios.config import resolve
@@ -124,8 +128,9 @@ def figures_of(result: RunResult, start: float) -> Figures:
     if seen is None or summary["roll_rms_deg"] is None:
         return Figures.of_fall()
     distance, drift = summary["distance_m"], summary["lateral_drift_m"]
-    events = [e for telemetry in data.telemetry if telemetry.time >= start for e in telemetry.events]
-    cuts = sum(CUT in event for event in events)
+    ticks = [telemetry for telemetry in data.telemetry if telemetry.time >= start]
+    cuts = sum(CUT in event for telemetry in ticks for event in telemetry.events)
+    stopped = sum(bool(telemetry.level and telemetry.level.stopped) for telemetry in ticks)
     return Figures(
         fell=bool(summary["fell"]) or summary["stop_reason"] != "completed",
         roll=summary["roll_rms_deg"],
@@ -134,4 +139,16 @@ def figures_of(result: RunResult, start: float) -> Figures:
         speed_error=100.0 * (seen / wanted - 1.0) if wanted else 0.0,
         drift=100.0 * abs(drift / distance) if wanted and distance else 0.0,
         cuts=cuts / (end - start),
+        stopped=stopped / len(ticks),
+        **_effort(data, start),
     )
+
+
+def _effort(data: RunData, start: float) -> dict[str, float]:
+    """Height of the trunk, and how hard and fast the servos work, from `start` (s) on."""
+    samples = [sample for sample in data.truth if sample.time >= start]
+    return {
+        "height": 1e3 * float(np.mean([sample.q[2] for sample in samples])),
+        "torque": metrics.rms(np.concatenate([sample.motor_torque for sample in samples])),
+        "joint_speed": metrics.rms(np.concatenate([sample.v[6:] for sample in samples])),
+    }

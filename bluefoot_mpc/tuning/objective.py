@@ -39,6 +39,10 @@ class Figures:
     speed_error: float  # percent of the command, signed
     drift: float  # percent of the distance, magnitude
     cuts: float  # events of joint goals cut at a limit, per second
+    height: float = 0.0  # mm, mean of the trunk's origin over the world's floor
+    torque: float = 0.0  # N·m RMS over the motors
+    joint_speed: float = 0.0  # rad/s RMS over the joints
+    stopped: float = 0.0  # share of the ticks on which levelling had disengaged itself
 
     @classmethod
     def of_fall(cls) -> Figures:

@@ -24,6 +24,7 @@ class Parameter:
         high: largest value.
         step: distance of neighbouring values, counted from `low`; None varies freely.
         listed: True where the settings are lists, which get the value as their one entry.
+        log: True where a search looks at ratios: `low` is positive and there is no step.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Parameter:
     high: float
     step: float | None = None
     listed: bool = False
+    log: bool = False
 
     def __post_init__(self) -> None:
         """Check the range."""
@@ -40,6 +42,10 @@ class Parameter:
         if not self.low < self.high:
             raise ConfigurationError(
                 f"parameter '{self.name}': low = {self.low!r} must be below high = {self.high!r}"
+            )
+        if self.log and (self.low <= 0.0 or self.step is not None):
+            raise ConfigurationError(
+                f"parameter '{self.name}': a search by ratios needs low > 0 (it is {self.low!r}) and no step"
             )
 
     def clipped(self, value: float) -> float:

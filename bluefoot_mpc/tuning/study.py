@@ -26,6 +26,9 @@ from bluefoot_mpc.tuning.space import Space, Values
 Measure = Callable[[TuningCase, str, tuple[str, ...], int], Figures]
 """Runs a case with a controller, overrides and a seed."""
 
+Judge = Callable[[Sequence[TuningCase], Mapping[str, Sequence[Figures]]], float]
+"""Makes one cost of the figures of every case, by name, in the order of the seeds; smaller is better."""
+
 FIRST_SEED = 100
 """Seeds below this are kept for figures that are reported: no study may use them."""
 _FINISHED = (optuna.trial.TrialState.COMPLETE, optuna.trial.TrialState.PRUNED)
@@ -79,12 +82,19 @@ class StudyResult:
     figures: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
 
 
+def weighted_cost(cases: Sequence[TuningCase], seen: Mapping[str, Sequence[Figures]]) -> float:
+    """Mean of the cases' costs against their bars, by their weights."""
+    whole = sum(case.weight for case in cases)
+    return sum(case.weight * cost(seen[case.name], case.bars) for case in cases) / whole
+
+
 def run_study(
     config: StudyConfig,
     space: Space,
     cases: Sequence[TuningCase],
     start: Sequence[Mapping[str, float]] = (),
     evaluate: Measure = measure,
+    judge: Judge = weighted_cost,
 ) -> StudyResult:
     """Search until the budget is spent; a study on a file counts its earlier trials.
 
@@ -94,6 +104,7 @@ def run_study(
         cases: what each point is judged on.
         start: points to try first, in this order; skipped where the study has them already.
         evaluate: runs one seed of one case.
+        judge: makes one cost of all figures.
 
     Raises:
         ConfigurationError: there is no case, or a start point does not fit the space.
@@ -105,7 +116,7 @@ def run_study(
         study.enqueue_trial(space.checked(point), skip_if_exists=True)
 
     def objective(trial: optuna.Trial) -> float:
-        return _trial(trial, config, space, cases, evaluate)
+        return _trial(trial, config, space, cases, (evaluate, judge))
 
     while (left := config.trials - _spent(study)) > 0:
         study.optimize(objective, n_trials=left)
@@ -162,10 +173,17 @@ def _spent(study: optuna.Study) -> int:
 
 
 def _trial(
-    trial: optuna.Trial, config: StudyConfig, space: Space, cases: Sequence[TuningCase], evaluate: Measure
+    trial: optuna.Trial,
+    config: StudyConfig,
+    space: Space,
+    cases: Sequence[TuningCase],
+    how: tuple[Measure, Judge],
 ) -> float:
     """Cost of one point over all seeds, given up at a rung where it falls behind."""
-    values = {p.name: trial.suggest_float(p.name, p.low, p.high, step=p.step) for p in space.parameters}
+    evaluate, judge = how
+    values = {
+        p.name: trial.suggest_float(p.name, p.low, p.high, step=p.step, log=p.log) for p in space.parameters
+    }
     overrides = space.overrides(values)
     seen: dict[str, dict[int, Figures]] = {case.name: {} for case in cases}
     total, done = float("inf"), 0
@@ -174,15 +192,10 @@ def _trial(
             for case in cases:
                 seen[case.name][seed] = evaluate(case, config.controller, overrides, seed)
         done = rung
-        total = _weighted(cases, seen)
+        total = judge(cases, {name: list(runs.values()) for name, runs in seen.items()})
         trial.report(total, rung)
         record = {name: {seed: asdict(f) for seed, f in runs.items()} for name, runs in seen.items()}
         trial.set_user_attr("figures", json.dumps(record))
         if rung < config.rungs[-1] and trial.should_prune():
             raise optuna.TrialPruned
     return total
-
-
-def _weighted(cases: Sequence[TuningCase], seen: Mapping[str, Mapping[int, Figures]]) -> float:
-    whole = sum(case.weight for case in cases)
-    return sum(case.weight * cost(list(seen[case.name].values()), case.bars) for case in cases) / whole
