@@ -158,12 +158,19 @@ class Compensator:
         tilt = math.hypot(*(estimate.rpy[:2] - inputs.tilt_reference).tolist())
         healthy = estimate.healthy and math.isfinite(tilt)
         if inputs.walking:
-            usable = healthy and (predicted is not None or not self._source.ready)
-            self._guard.watch(usable, tilt, self._source.fault, dt)
+            self._guard.watch(tilt, self._source.fault, self._doubt(healthy, predicted), dt)
         wanted = inputs.walking and schedule.wants_on(estimate.time, config) and self._source.ready
         self._share = schedule.faded(self._share, wanted and not self._guard.stopped, dt, config)
         if not healthy or predicted is None:
             self._share = 0.0  # Nothing to act on, not even while it fades.
+
+    def _doubt(self, healthy: bool, predicted: FloatArray | None) -> str:
+        """Why not to act for now; empty without a reason."""
+        if not healthy:
+            return "the estimate is not to be trusted"
+        if predicted is None and self._source.ready:
+            return "nothing predicts the disturbance"
+        return self._source.doubt
 
     def _bounded(self, dynamics: TrunkDynamics, predicted: FloatArray | None) -> FloatArray:
         """(3,) rad/s², angular acceleration Γ1 M̂⁻¹ ψ̂ of the trunk within its bound."""

@@ -16,7 +16,7 @@ PAUSE = 1.0
 class Guard:
     """Watches the compensator and lets go.
 
-    A passing reason (blind estimate, large tilt, missing sample) pauses it; a
+    A passing reason (blind estimate, large tilt, missing prediction) pauses it; a
     fault of its own (diverged network, goals at their limits for long) stops it
     until `reset`.
 
@@ -38,22 +38,23 @@ class Guard:
         self._final = False
         self._clamped = self._pause = 0.0
 
-    def watch(self, healthy: bool, tilt: float, fault: str, dt: float) -> None:
+    def watch(self, tilt: float, fault: str, doubt: str, dt: float) -> None:
         """Take the tick's evidence.
 
         Args:
-            healthy: whether estimate and prediction can be used.
             tilt: rad, of the trunk against its reference.
-            fault: why the source of ψ is out of use; empty while it is not.
+            fault: what stops it for good; empty without.
+            doubt: what pauses it; empty without.
             dt: s.
         """
         if self._final:
             return
+        if not doubt and not tilt <= self._tilt:
+            doubt = f"the trunk tilts by more than {self._limits.tilt_deg:g} degrees"
         if fault:
             self._stop(fault)
-        elif not healthy or not tilt <= self._tilt:
-            self.stopped = "the trunk tilts too far" if healthy else "estimate or prediction is missing"
-            self._pause = PAUSE
+        elif doubt:
+            self.stopped, self._pause = doubt, PAUSE
         elif self._pause > 0.0:
             self._pause -= dt
             self.stopped = self.stopped if self._pause > 0.0 else ""

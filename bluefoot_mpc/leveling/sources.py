@@ -48,12 +48,14 @@ class Source(Protocol):
         rate: learning rate, NaN where nothing learns.
         ready: False while a prediction is not to be used yet.
         fault: why predictions can no longer be used; empty while they can.
+        doubt: why they are not to be used for now; empty while they can.
     """
 
     mse: float
     rate: float
     ready: bool
     fault: str
+    doubt: str
 
     def reset(self) -> None:
         """Forget everything."""
@@ -69,6 +71,7 @@ class _Plain:
     rate = math.nan
     ready = True
     fault = ""
+    doubt = ""
 
     def reset(self) -> None:
         """Nothing is remembered."""
@@ -118,6 +121,7 @@ class Network:
         rate: learning rate.
         ready: True with loaded weights, or once it has learnt for long enough.
         fault: why it is out of use; empty while it is not.
+        doubt: set while it predicts worse than who always says zero.
 
     Args:
         config: of the compensator.
@@ -158,6 +162,8 @@ class Network:
         self.mse, self.rate = self._narx.mse, self._narx.rate
         self.ready = self._weights is not None or self._learnt >= self._learn_time - 1e-9
         self.fault = "the network has diverged" if self._narx.diverged else ""
+        useless = self.ready and self._narx.mse > self._narx.power
+        self.doubt = "the network predicts worse than nothing" if useless else ""
 
 
 def make_source(config: LevelingConfig, dynamics: Dynamics) -> Source:
