@@ -30,6 +30,7 @@ from bluefoot_mpc.estimation.estimator import Estimator
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.gait.gait import Gait, GaitInputs, GaitOutput, Style
 from bluefoot_mpc.geometry import rotation_from_rpy
+from bluefoot_mpc.leveling.narx import NarxWeights
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.types import (
     N_JOINTS,
@@ -108,6 +109,11 @@ class Pipeline:
         self._notices: tuple[str, ...] = ()
         self._step_back.reset()
         self._walking = False
+
+    @property
+    def learnt(self) -> NarxWeights | None:
+        """What the levelling network has learnt; None without one."""
+        return None if self._level is None else self._level.compensator.source.weights
 
     def step(
         self, frame: SensorFrame, motion: MotionCommand, safety: SafetyRequest | None = None

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from bluefoot_mpc.leveling.config import LevelingConfig
-from bluefoot_mpc.leveling.narx import Narx, load_weights
+from bluefoot_mpc.leveling.narx import Narx, NarxWeights, load_weights
 from bluefoot_mpc.leveling.signals import INPUT_SCALE, OUTPUT_SCALE, OUTPUTS
 from bluefoot_mpc.model.dynamics import Dynamics
 from bluefoot_mpc.types import FloatArray
@@ -57,6 +57,10 @@ class Source(Protocol):
     fault: str
     doubt: str
 
+    @property
+    def weights(self) -> NarxWeights | None:
+        """What it has learnt; None where nothing learns."""
+
     def reset(self) -> None:
         """Forget everything."""
 
@@ -72,6 +76,7 @@ class _Plain:
     ready = True
     fault = ""
     doubt = ""
+    weights = None
 
     def reset(self) -> None:
         """Nothing is remembered."""
@@ -145,9 +150,9 @@ class Network:
         self._note()
 
     @property
-    def narx(self) -> Narx:
-        """The network itself, to save its weights."""
-        return self._narx
+    def weights(self) -> NarxWeights | None:
+        """What the network has learnt; None once it has diverged."""
+        return None if self._narx.diverged else self._narx.weights
 
     def step(self, situation: Situation, dt: float) -> FloatArray | None:
         """(22,) predicted ψ; None after a bad input, or once the network has diverged."""

@@ -19,6 +19,7 @@ from bluefoot_mpc.exceptions import ConfigurationError, LogError
 from bluefoot_mpc.io.pacing import PacedRobot
 from bluefoot_mpc.io.robot import Robot
 from bluefoot_mpc.io.safety import SafetySupervisor
+from bluefoot_mpc.leveling.narx import save_weights
 from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
@@ -37,6 +38,8 @@ from bluefoot_mpc.viz.report import write_report
 
 LOG, SUMMARY, REPORT, CONFIG = "log.mcap", "summary.json", "report.html", "config.toml"
 """Files that a run writes into its folder."""
+WEIGHTS = "narx.npz"
+"""What the levelling network has learnt, where one ran; ``control.leveling.weights`` takes it."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -105,9 +108,8 @@ def simulate(name_or_path: str, options: RunOptions) -> RunResult:
     """
     resolved = resolve(find_scenario(name_or_path), options)
     model, simulator, table = _prepare(resolved)
-    data = _drive(
-        simulator, model, resolved, resolved.scenario.source, LoopHooks(truth=simulator.truth), table
-    )
+    hooks = LoopHooks(truth=simulator.truth)
+    data, _ = _drive(simulator, model, resolved, resolved.scenario.source, hooks, table)
     return _judge(data, resolved, model, Path())
 
 
@@ -140,10 +142,13 @@ def run_commanded(
             robot = PacedRobot(simulator) if paced else simulator
             with Recorder(folder / LOG, table, simulator.period) as recorder:
                 hooks = LoopHooks(recorder=recorder, truth=simulator.truth, observers=observers)
-                data = _drive(robot, model, resolved, source, hooks, table)
+                data, pipeline = _drive(robot, model, resolved, source, hooks, table)
                 recorder.finish(data.stop_reason, data.real_time_factor)
         result = _judge(data, resolved, model, folder)
         _write_results(result, model, options.report)
+        if pipeline.learnt is not None:
+            with _writing(folder / WEIGHTS):
+                save_weights(folder / WEIGHTS, pipeline.learnt)
     return result
 
 
@@ -214,12 +219,12 @@ def _drive(
     source: CommandSource,
     hooks: LoopHooks,
     table: dict[str, Any],
-) -> RunData:
-    """The loop itself; the robot is closed whatever happens."""
+) -> tuple[RunData, Pipeline]:
+    """The loop itself, and the controller as it left it; the robot is closed whatever happens."""
     try:
         supervised = supervise(robot, model, resolved)
         pipeline = Pipeline(model, resolved.stages.control, robot.period)
-        return run_loop(supervised, pipeline, source, hooks, table)
+        return run_loop(supervised, pipeline, source, hooks, table), pipeline
     finally:
         robot.close()
 
@@ -258,7 +263,7 @@ def _make_folder(options: RunOptions, scenario: str) -> Path:
         if options.out is None:
             return _new_folder(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        for name in (LOG, SUMMARY, REPORT, CONFIG):
+        for name in (LOG, SUMMARY, REPORT, CONFIG, WEIGHTS):
             (folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise ConfigurationError(f"cannot write to --out {folder}: {error.strerror or error}") from error
