@@ -204,20 +204,22 @@ class DriveCommand(SimulationArguments):
 
 @dataclass(frozen=True, kw_only=True)
 class BenchCommand(Common):
-    """Compare the controllers: an ablation over seeds, the time of every layer, the limit of pushes.
+    """Compare the controllers, and the parts of trunk levelling, over seeds.
 
-    Runs are kept in the output folder; a bench that was stopped goes on where it stopped.
-    Exit status 1 where the full controller misses a stated limit.
+    Parts: an ablation of the controllers, the time of every layer, the limit of pushes, and an
+    ablation of trunk levelling. Runs are kept in the output folder; a bench that was stopped goes
+    on where it stopped. Exit status 1 where the full controller, or levelling, misses a stated limit.
     """
 
     parts: Annotated[str, tyro.conf.arg(metavar="PART,...")] = "ablation,timing"
-    """What to measure: ablation, timing, pushes."""
-    cases: Annotated[str, tyro.conf.arg(metavar="CASE,...")] = "walk-30,trot-100,payload,slope-up"
-    """Cases of the ablation (a wrong one lists all)."""
+    """What to measure: ablation, timing, pushes, level."""
+    cases: Annotated[str | None, tyro.conf.arg(metavar="CASE,...", help_behavior_hint="")] = None
+    """Cases of ablation and level, or all (some of each unless given; a wrong one lists them)."""
     variants: Annotated[str, tyro.conf.arg(metavar="VARIANT,...", help_behavior_hint="")] = ""
-    """Rows of the ablation (all unless given); the others are compared with the first of them."""
+    """Rows of the tables (all unless given): of the ablation, the others are compared with the first;
+    of level, with pd and persistence."""
     seeds: int = 5
-    """Randomised robots for every case, from seed 0."""
+    """Runs of every case, from seed 0; in most of them the robot is drawn from the seed."""
     duration: Annotated[float | None, _Unset] = None
     """Length of the runs, s (each case's own unless given)."""
     full: bool = False

@@ -1,9 +1,8 @@
-"""``bluefoot bench``: ablation, time of every layer, limit of pushes."""
+"""``bluefoot bench``: ablation, time of every layer, limit of pushes, parts of trunk levelling."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any
@@ -13,44 +12,21 @@ from rich.console import Console
 
 from bluefoot_mpc.cli.arguments import BenchCommand
 from bluefoot_mpc.cli.bench_page import bench_page
+from bluefoot_mpc.cli.bench_plan import Plan, plan_of
 from bluefoot_mpc.cli.outcome import FAILED, OK, Outcome, to_json
-from bluefoot_mpc.evaluation import ablation, push_limit
+from bluefoot_mpc.evaluation import ablation, level_ablation, push_limit
 from bluefoot_mpc.evaluation.battery import Store, source_hash
-from bluefoot_mpc.evaluation.cases import Case
-from bluefoot_mpc.evaluation.push_limit import PushSearch
 from bluefoot_mpc.evaluation.timing import ROUNDS, time_layers
-from bluefoot_mpc.evaluation.variants import VARIANTS, Variant, variants
-from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.evaluation.variants import VARIANTS
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.runtime.versions import installed_versions
 from bluefoot_mpc.scenarios import RunOptions
 from bluefoot_mpc.viz.bench import bench_html
 
-PARTS = ("ablation", "timing", "pushes")
-FULL_SEEDS = 20
 TIMED = {"trot 60 mm/s": ("trot", 0.06), "walk 30 mm/s": ("walk", 0.03)}
 """Runs whose ticks are timed: two feet on the ground, and three or four."""
-_TIMED_DURATION = 8.0
 _RESULTS, _PAGE, _RUNS = "bench.json", "bench.html", "runs.jsonl"
 _Done = Callable[..., None]
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True, slots=True)
-class Plan:
-    """What a bench measures.
-
-    Attributes:
-        parts: of `PARTS`.
-        cases: of the ablation, by name.
-        rows: variants of the ablation.
-        pushes: how the limit of pushes is looked for.
-        duration: s of the timed runs.
-    """
-
-    parts: tuple[str, ...]
-    cases: dict[str, Case]
-    rows: tuple[Variant, ...]
-    pushes: PushSearch
-    duration: float
 
 
 def bench(command: BenchCommand) -> Outcome:
@@ -70,44 +46,16 @@ def bench(command: BenchCommand) -> Outcome:
     return Outcome(status=data["exit_status"], data=data, page=bench_page(data))
 
 
-def plan_of(command: BenchCommand) -> Plan:
-    """What a command line asks for.
-
-    Raises:
-        UnknownNameError: a part, case or variant does not exist.
-    """
-    parts = PARTS if command.full else _names(command.parts)
-    for part in parts:
-        if part not in PARTS:
-            raise UnknownNameError("part", part, PARTS)
-    if not parts:
-        raise ConfigurationError(f"--parts names no part. Valid: {', '.join(PARTS)}")
-    seeds = FULL_SEEDS if command.full else command.seeds
-    names = tuple(ablation.bench_cases()) if command.full else _names(command.cases)
-    rows = variants(_names(command.variants))
-    cases = ablation.chosen(names, seeds, command.duration)
-    if "ablation" in parts and not cases:
-        raise ConfigurationError(f"--cases names no case. Valid: {', '.join(ablation.bench_cases())}")
-    return Plan(
-        parts=parts,
-        cases=cases if "ablation" in parts else {},
-        rows=rows,
-        pushes=PushSearch(seeds=seeds),
-        duration=command.duration or _TIMED_DURATION,
-    )
-
-
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in text.split(",") if name.strip())
-
-
 def _measured(plan: Plan, store: Store, workers: int | None) -> dict[str, Any]:
     data: dict[str, Any] = {
-        "parts": list(plan.parts), "seeds": plan.pushes.seeds, "cases": {}, "variants": _told(plan.rows),
-        "ablation": [], "criteria": [], "timing": {}, "pushes": {},
+        "parts": list(plan.parts), "seeds": plan.pushes.seeds, "cases": {},
+        "variants": {row.name: row.meaning for row in plan.rows} if plan.needs_variants else {},
+        "ablation": [], "criteria": [], "timing": {}, "pushes": {}, "level": {},
     }  # fmt: skip
     if "ablation" in plan.parts:
         data |= _ablation(plan, store, workers)
+    if "level" in plan.parts:
+        data = _with_level(data, plan, store, workers)
     if "pushes" in plan.parts:
         data |= _pushes(plan, store, workers)
     if "timing" in plan.parts:
@@ -129,6 +77,21 @@ def _ablation(plan: Plan, store: Store, workers: int | None) -> dict[str, Any]:
         "ablation": [row.as_plain() for row in rows],
         "criteria": ablation.criteria(rows, VARIANTS[-1].name),
     }
+
+
+def _with_level(data: dict[str, Any], plan: Plan, store: Store, workers: int | None) -> dict[str, Any]:
+    """The data with the ablation of trunk levelling, its limits behind the others."""
+    cases, parts = plan.level_cases, plan.level_parts
+    with _bar("level", level_ablation.missing_level_runs(cases, parts, store)) as done:
+        rows = level_ablation.ablate_leveling(cases, parts, store, workers=workers, progress=done)
+    level = {
+        "cases": {name: case.name for name, case in cases.items()},
+        "parts": {part.name: part.meaning for part in parts},
+        "rows": [row.as_plain() for row in rows],
+        "credits": level_ablation.credits_of(rows),
+        "least_gain": level_ablation.CREDIT,
+    }
+    return data | {"level": level, "criteria": [*data["criteria"], *level_ablation.level_criteria(rows)]}
 
 
 def _pushes(plan: Plan, store: Store, workers: int | None) -> dict[str, Any]:
@@ -158,10 +121,6 @@ def _timing(plan: Plan) -> dict[str, Any]:
                 for run, layers in found.items()
             }
     return {"timing": timing}
-
-
-def _told(rows: Sequence[Variant]) -> dict[str, str]:
-    return {row.name: row.meaning for row in rows}
 
 
 @contextmanager

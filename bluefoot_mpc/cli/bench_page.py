@@ -10,6 +10,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from bluefoot_mpc.cli.bench_level_page import level_pages
 from bluefoot_mpc.viz.bench import layers_in_order
 
 _NONE = "–"
@@ -26,6 +27,8 @@ def bench_page(data: Mapping[str, Any]) -> tuple[RenderableType, ...]:
         for name, title in data["cases"].items():
             parts.append(_ablation(title, [row for row in data["ablation"] if row["case"] == name]))
         parts.append(_legend(data["variants"]))
+    if data["level"]:
+        parts += level_pages(data["level"])
     if data["criteria"]:
         parts.append(_criteria(data["criteria"]))
     if data["pushes"]:
@@ -70,7 +73,7 @@ def _legend(variants: Mapping[str, str]) -> Table:
 def _criteria(criteria: Sequence[Mapping[str, Any]]) -> RenderableType:
     missed = [row for row in criteria if not row["holds"]]
     if not missed:
-        return Text(f"all {len(criteria)} limits of the full controller hold\n", style="green")
+        return Text(f"all {len(criteria)} limits hold\n", style="green")
     table = _table(f"{len(missed)} of {len(criteria)} limits missed", "case", "figure", "limit", "reached")
     for row in missed:
         reached = "unknown" if row["value"] is None else f"{row['value']:.3g}"

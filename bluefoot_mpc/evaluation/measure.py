@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from bluefoot_mpc.evaluation.cases import Case
+from bluefoot_mpc.evaluation.level_measure import leveling_figures
 from bluefoot_mpc.runtime import metrics
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.runtime.summary import summarize
@@ -65,6 +66,7 @@ def measure(case: Case, seed: int) -> Figures:
         "tick_us": (summary["tick_us"] or {}).get("p50"),
         "cost_of_transport": summary["cost_of_transport"],
         **_lags(summary["figures"]),
+        **leveling_figures(summary["figures"]),
     }
 
 

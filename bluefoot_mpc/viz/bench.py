@@ -1,10 +1,11 @@
-"""A bench as one self-contained page: verdict, ablation, limit of pushes, time of every layer."""
+"""A bench as one self-contained page: verdict, ablations, limit of pushes, time of every layer."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from bluefoot_mpc.viz.bench_level import LEVEL_HEAD, credit_line, credit_of, level_cells, level_panels
 from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
 from bluefoot_mpc.viz.plots import Panel, Trace
 from bluefoot_mpc.viz.style import COM, COMMAND, ESTIMATE, GOOD, NEUTRAL, ZMP
@@ -45,10 +46,11 @@ def bench_html(data: Data) -> str:
         headline=_headline(data, missed),
         status="" if not data["criteria"] else "bad" if missed else "good",
         facts=_facts(data),
-        variants=data["variants"],
+        variants={**data["variants"], **(data["level"].get("parts") or {})},
         panels=panels,
         criteria=data["criteria"],
         rows=[_cells(row, data["cases"]) for row in data["ablation"]],
+        level=_level_table(data["level"]),
         timings=[_timing_table(name, columns) for name, columns in data["timing"].items()],
         versions=sorted(data["versions"].items()),
         figures=embed_json(figures),
@@ -62,6 +64,8 @@ def bench_panels(data: Data) -> list[Panel]:
     panels = []
     if data["ablation"]:
         panels += [tilt_panel(data), ratio_panel(data)]
+    if data["level"]:
+        panels += level_panels(data["level"])
     if data["pushes"]:
         panels.append(push_panel(data["pushes"], data["push_search"]))
     panels += [
@@ -231,7 +235,7 @@ def _headline(data: Data, missed: Sequence[Data]) -> str:
 
 
 def _facts(data: Data) -> list[tuple[str, str]]:
-    return [("parts", ", ".join(data["parts"])), ("robots", str(data["seeds"])), ("source", data["source"])]
+    return [("parts", ", ".join(data["parts"])), ("seeds", str(data["seeds"])), ("source", data["source"])]
 
 
 def _cells(row: Data, cases: Mapping[str, str]) -> list[str]:
@@ -249,6 +253,18 @@ def _cells(row: Data, cases: Mapping[str, str]) -> list[str]:
         _spread(figures["plan_margin_mm"], "min"),
         _spread(figures["attitude_error_deg"], "max"),
     ]
+
+
+def _level_table(level: Data) -> dict[str, Any]:
+    """Head and rows of the table of trunk levelling, and the network's verdict; empty without that part."""
+    if not level:
+        return {}
+    cases, judged = level["cases"], level["credits"]
+    return {
+        "head": [*LEVEL_HEAD, "network"],
+        "rows": [[*level_cells(row, cases), credit_of(row, judged)] for row in level["rows"]],
+        "credit": credit_line(level) if judged else "",
+    }
 
 
 def layers_in_order(columns: Mapping[str, Mapping[str, Data]]) -> list[str]:

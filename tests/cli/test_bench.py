@@ -5,6 +5,8 @@ import json
 import pytest
 
 from bluefoot_mpc.cli import bench as bench_module
+from bluefoot_mpc.cli import bench_plan
+from bluefoot_mpc.cli.arguments import BenchCommand
 from bluefoot_mpc.cli.main import main
 from bluefoot_mpc.evaluation import battery as battery_module
 from bluefoot_mpc.evaluation.timing import Timing
@@ -106,7 +108,7 @@ def test_the_page_opens_offline_and_the_terminal_shows_the_tables(runs, capfd, t
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--parts", "ablations"], "ablation, pushes, timing"),
+        (["--parts", "ablations"], "ablation, level, pushes, timing"),
         (["--cases", "walk-31"], "walk-30"),
         (["--cases", ","], "walk-30"),
         (["--variants", "cpq"], "cpg"),
@@ -124,11 +126,11 @@ def test_wrong_use_is_told_with_what_is_valid(runs, capfd, words, message):
 
 
 def test_full_asks_for_everything(capfd):
-    command = bench_module.BenchCommand(full=True, cases="payload", parts="timing", seeds=1)
-    plan = bench_module.plan_of(command)
-    assert plan.parts == bench_module.PARTS
+    command = BenchCommand(full=True, cases="payload", parts="timing", seeds=1)
+    plan = bench_plan.plan_of(command)
+    assert plan.parts == bench_plan.PARTS
     assert len(plan.cases) > 10
-    assert plan.pushes.seeds == bench_module.FULL_SEEDS
+    assert plan.pushes.seeds == bench_plan.FULL_SEEDS
     assert len(plan.cases["push-2"].seeds) == 240
 
 

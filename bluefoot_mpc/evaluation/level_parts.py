@@ -1,0 +1,78 @@
+"""Rows of the levelling ablation: the compensator with its parts chosen one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from bluefoot_mpc.exceptions import UnknownNameError
+
+FEEDBACK, PERSISTENCE, NETWORK = "pd", "persistence", "narx"
+"""The row that the others are compared with, the cheapest prediction, and the one that has to beat both."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class LevelPart:
+    """A choice of the compensator's parts.
+
+    Attributes:
+        name: as tables and options call it.
+        attitude: whether tilt and its rate are fed back.
+        psi: where the disturbance comes from.
+        controllers: those under which it is measured.
+        meaning: one line for people.
+    """
+
+    name: str
+    attitude: bool
+    psi: str
+    controllers: tuple[str, ...] = ("cpg", "mpc")
+    meaning: str
+
+    def overrides(self, controller: str) -> tuple[str, ...]:
+        """``section.key=value`` that chooses the parts, with this row's own gains.
+
+        Args:
+            controller: under which it runs.
+        """
+        chosen = f"control.leveling.attitude={str(self.attitude).lower()}", f"control.leveling.psi={self.psi}"
+        return (*chosen, *TUNED.get(controller, {}).get(self.name, ()))
+
+
+TUNED: Mapping[str, Mapping[str, tuple[str, ...]]] = {"cpg": {}, "mpc": {}}
+"""By controller and row: gains that were tuned for this row; a row without has those of the configuration."""
+
+LEVEL_PARTS = (
+    LevelPart(
+        name="mix", attitude=False, psi="zero", controllers=("cpg",),
+        meaning="mixing alone: no levelling torque, softer servos",
+    ),
+    LevelPart(name=FEEDBACK, attitude=True, psi="zero", meaning="attitude feedback"),
+    LevelPart(name=NETWORK, attitude=True, psi="network", meaning="attitude feedback and the network"),
+    LevelPart(
+        name="network", attitude=False, psi="network", controllers=("cpg",),
+        meaning="the network without attitude feedback",
+    ),
+    LevelPart(
+        name=PERSISTENCE, attitude=True, psi="persistence",
+        meaning="attitude feedback and the disturbance last measured",
+    ),
+    LevelPart(
+        name="model", attitude=True, psi="model",
+        meaning="attitude feedback and the disturbance by the robot's model",
+    ),
+)  # fmt: skip
+"""In the order of the tables."""
+
+
+def level_parts(names: tuple[str, ...] = ()) -> tuple[LevelPart, ...]:
+    """The rows of these names, all of them where none is given.
+
+    Raises:
+        UnknownNameError: there is no such row.
+    """
+    known = {part.name: part for part in LEVEL_PARTS}
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("levelling part", name, known)
+    return tuple(part for name, part in known.items() if name in names or not names)
