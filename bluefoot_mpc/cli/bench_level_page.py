@@ -9,7 +9,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
 from rich.table import Table
 
-from bluefoot_mpc.viz.bench_level import by_window, credit_line, credit_of, lower, ratio_text
+from bluefoot_mpc.viz.bench_level import credit_line, lower, ratio_text
 
 
 def level_pages(level: Mapping[str, Any]) -> list[RenderableType]:
@@ -22,40 +22,41 @@ def level_pages(level: Mapping[str, Any]) -> list[RenderableType]:
     for name, title in level["cases"].items():
         rows = [row for row in level["rows"] if row["case"] == name]
         if rows:
-            parts.append(_case(title, rows, level["credits"]))
-    legend = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
-    for name, meaning in level["parts"].items():
-        legend.add_row(name, meaning)
-    parts.append(legend)
+            parts.append(_case(title, rows))
+    parts.append(_pairs(level["parts"]))
     if level["credits"]:
-        parts.append(f"\n{credit_line(level)}\n")
+        verdicts = {level["cases"][credit["case"]]: credit["verdict"] for credit in level["credits"]}
+        parts += ["\nWhat the network adds", _pairs(verdicts), f"\n{credit_line(level)}\n"]
     return parts
 
 
-def _case(
-    title: str, rows: Sequence[Mapping[str, Any]], credits_: Sequence[Mapping[str, Any]]
-) -> RenderableType:
+def _pairs(pairs: Mapping[str, str]) -> Table:
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    for name, meaning in pairs.items():
+        table.add_row(name, meaning)
+    return table
+
+
+def _case(title: str, rows: Sequence[Mapping[str, Any]]) -> Table:
     table = Table(
         title=f"Levelling, {title}: change of RMS in %, median (best…worst)", title_justify="left",
         box=SIMPLE_HEAD, padding=(0, 1, 0, 0),
     )  # fmt: skip
-    for k, name in enumerate(("part", "falls", "roll", "pitch", "by window", "mm/s", "mm", "tilt over pd")):
+    for k, name in enumerate(("part", "falls", "roll", "pitch", "tilt", "speed", "tilt over pd")):
         table.add_column(name, justify="left" if k < 1 else "right", no_wrap=True)
     for row in rows:
         figures = row["figures"]
-        against = " ".join((ratio_text(row["against"].get("pd")), credit_of(row, credits_))).strip()
         table.add_row(
             row["part"],
             f"{row['falls']}/{row['runs']}",
-            lower(figures["roll_reduction_percent"]),
-            lower(figures["pitch_reduction_percent"]),
-            by_window(figures),
-            _change(figures["speed_change_percent"], " %", 0),
-            _change(figures["height_change_mm"], "", 1),
-            against,
+            _change(figures["roll_reduction_percent"], -1.0),
+            _change(figures["pitch_reduction_percent"], -1.0),
+            lower(figures["tilt_reduction_percent"]),
+            _change(figures["speed_change_percent"]),
+            ratio_text(row["against"].get("pd")),
         )
     return table
 
 
-def _change(found: Mapping[str, float] | None, unit: str, digits: int) -> str:
-    return "–" if found is None else f"{found['median']:+.{digits}f}{unit}"
+def _change(found: Mapping[str, float] | None, sign: float = 1.0) -> str:
+    return "–" if found is None else f"{sign * found['median']:+.0f}"

@@ -19,6 +19,9 @@ COMPARED = tuple(f"on_{axis}_rms_deg" for axis in AXES)
 """Figures that rows are compared by; the last, both axes together, is what is judged."""
 CREDIT = 0.10
 """Least part by which the network must lie under feedback and under persistence to be credited."""
+CREDITED = "credited"
+LEAST_PAIRS = 5
+"""Fewer runs prove nothing, whatever their interval says."""
 SHOWN = (
     *(f"{kind}_{axis}_rms_deg" for kind in ("off", "on") for axis in AXES),
     *(f"{axis}_reduction_percent" for axis in AXES),
@@ -109,21 +112,23 @@ def missing_level_runs(cases: Mapping[str, Case], parts: Sequence[LevelPart], st
 
 
 def credits_of(rows: Sequence[LevelRow]) -> list[dict[str, Any]]:
-    """Case by case, whether the network is worth having.
+    """Case by case, whether the network is worth having, and why not.
 
-    It is credited where its tilt lies at least `CREDIT` under that of feedback alone and
-    under that of persistence, and neither interval reaches up to no difference.
-    Cases that lack one of the three rows are not judged.
+    It is credited where the trunk tilts less with it than without levelling, and by at
+    least `CREDIT` less than with feedback alone and than with persistence, both intervals
+    ending short of no difference. Cases that lack one of the three rows are not judged.
     """
     found = []
     for row in rows:
         if row.part.name != NETWORK or {FEEDBACK, PERSISTENCE} - row.against.keys():
             continue
         tilts = {other: comparisons[COMPARED[-1]] for other, comparisons in row.against.items()}
+        verdict = _judged(spread(_standing(row.verdict), "tilt_reduction_percent"), tilts)
         found.append(
             {
                 "case": row.case,
-                "credited": all(map(_clearly_less, tilts.values())),
+                "credited": verdict == CREDITED,
+                "verdict": verdict,
                 "against": {other: asdict(tilt) for other, tilt in tilts.items()},
             }
         )
@@ -135,8 +140,15 @@ def level_criteria(rows: Sequence[LevelRow]) -> list[dict[str, Any]]:
     return [limit for row in rows if row.part.name == NETWORK for limit in limit_rows(row.verdict)]
 
 
-def _clearly_less(tilt: Comparison) -> bool:
-    return tilt.reduces_by(CREDIT) and tilt.ratio is not None and tilt.ratio.high < 1.0
+def _judged(reduction: Mapping[str, float] | None, tilts: Mapping[str, Comparison]) -> str:
+    if min(tilt.pairs for tilt in tilts.values()) < LEAST_PAIRS:
+        return "too few runs"
+    if reduction is None or reduction["median"] <= 0.0:
+        return "does harm"
+    for other, tilt in tilts.items():
+        if not tilt.reduces_by(CREDIT) or tilt.ratio is None or tilt.ratio.high >= 1.0:
+            return f"no better than {other}"
+    return CREDITED
 
 
 def _jobs(cases: Mapping[str, Case], parts: Sequence[LevelPart]) -> list[tuple[str, LevelPart, Case]]:

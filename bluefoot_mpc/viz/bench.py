@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bluefoot_mpc.viz.bench_level import LEVEL_HEAD, credit_line, credit_of, level_cells, level_panels
+from bluefoot_mpc.viz.bench_level import level_panels, level_table
 from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
 from bluefoot_mpc.viz.plots import Panel, Trace
 from bluefoot_mpc.viz.style import COM, COMMAND, ESTIMATE, GOOD, NEUTRAL, ZMP
@@ -50,7 +50,7 @@ def bench_html(data: Data) -> str:
         panels=panels,
         criteria=data["criteria"],
         rows=[_cells(row, data["cases"]) for row in data["ablation"]],
-        level=_level_table(data["level"]),
+        level=level_table(data["level"]),
         timings=[_timing_table(name, columns) for name, columns in data["timing"].items()],
         versions=sorted(data["versions"].items()),
         figures=embed_json(figures),
@@ -253,18 +253,6 @@ def _cells(row: Data, cases: Mapping[str, str]) -> list[str]:
         _spread(figures["plan_margin_mm"], "min"),
         _spread(figures["attitude_error_deg"], "max"),
     ]
-
-
-def _level_table(level: Data) -> dict[str, Any]:
-    """Head and rows of the table of trunk levelling, and the network's verdict; empty without that part."""
-    if not level:
-        return {}
-    cases, judged = level["cases"], level["credits"]
-    return {
-        "head": [*LEVEL_HEAD, "network"],
-        "rows": [[*level_cells(row, cases), credit_of(row, judged)] for row in level["rows"]],
-        "credit": credit_line(level) if judged else "",
-    }
 
 
 def layers_in_order(columns: Mapping[str, Mapping[str, Data]]) -> list[str]:

@@ -11,10 +11,10 @@ from bluefoot_mpc.viz.style import COM, COMMAND, ESTIMATE, GOOD, NEUTRAL, ZMP
 Data = Mapping[str, Any]
 
 LEVEL_HEAD = (
-    "case", "part", "falls", "let go", "roll ° off → on", "pitch ° off → on", "roll %", "pitch %",
-    "tilt % by window", "peak ° off → on", "mm/s off → on", "height mm", "tilt over pd", "over persistence",
+    "part", "falls", "roll °", "roll %", "pitch °", "pitch %", "over pd", "over persistence", "network",
+    "tilt % by window", "peak °", "mm/s", "height mm", "let go",
 )  # fmt: skip
-"""Titles of the cells that `level_cells` gives."""
+"""Titles of the cells that `level_cells` gives; what has an arrow is without → with levelling."""
 _COLOURS = {
     "mix": NEUTRAL, "pd": ESTIMATE, "narx": COMMAND, "network": ZMP, "persistence": GOOD, "model": COM,
 }  # fmt: skip
@@ -133,30 +133,49 @@ def _ratios(level: Data, name: str, other: str, colour: str, symbol: str) -> Tra
     }
 
 
-def level_cells(row: Data, cases: Mapping[str, str]) -> list[str]:
+def level_cells(row: Data, credits_: Sequence[Data]) -> list[str]:
     """A row of the table, in the order of `LEVEL_HEAD`.
 
     Args:
         row: a part in a case.
-        cases: name to title of the cases.
+        credits_: whether the network earned its place, case by case.
     """
-    f = row["figures"]
+    f, against = row["figures"], row["against"]
     return [
-        cases[row["case"]],
         row["part"],
         f"{row['falls']} of {row['runs']}",
-        str(row["disengaged"]),
         off_on(f, "roll_rms_deg", 2),
-        off_on(f, "pitch_rms_deg", 2),
         lower(f["roll_reduction_percent"]),
+        off_on(f, "pitch_rms_deg", 2),
         lower(f["pitch_reduction_percent"]),
+        ratio_text(against.get("pd")),
+        ratio_text(against.get("persistence")),
+        credit_of(row, credits_),
         by_window(f),
         off_on(f, "tilt_peak_deg", 1),
         off_on(f, "speed_mmps", 1),
         _DASH if f["height_change_mm"] is None else f"{f['height_change_mm']['median']:+.1f}",
-        ratio_text(row["against"].get("pd")),
-        ratio_text(row["against"].get("persistence")),
+        str(row["disengaged"]),
     ]
+
+
+def level_table(level: Data) -> dict[str, Any]:
+    """Head, rows by case, and the network's verdict; empty without the part.
+
+    Args:
+        level: part ``level`` of a bench.
+    """
+    if not level:
+        return {}
+    groups = [
+        (title, [level_cells(row, level["credits"]) for row in level["rows"] if row["case"] == name])
+        for name, title in level["cases"].items()
+    ]
+    return {
+        "head": LEVEL_HEAD,
+        "groups": [(title, rows) for title, rows in groups if rows],
+        "credit": credit_line(level) if level["credits"] else "",
+    }
 
 
 def lower(found: Mapping[str, float] | None) -> str:
@@ -195,4 +214,4 @@ def credit_of(row: Data, credits_: Sequence[Data]) -> str:
     judged = [credit for credit in credits_ if credit["case"] == row["case"]]
     if row["part"] != "narx" or not judged:
         return ""
-    return "credited" if judged[0]["credited"] else "not credited"
+    return str(judged[0]["verdict"])
