@@ -13,7 +13,7 @@ from bluefoot_mpc.geometry import wrap_angle
 from bluefoot_mpc.leveling.compensator import Compensator, Leveled
 from bluefoot_mpc.leveling.config import LevelingConfig
 from bluefoot_mpc.leveling.contact_force import specific_force
-from bluefoot_mpc.leveling.signals import LevelingInputs
+from bluefoot_mpc.leveling.signals import LevelingInputs, newest_rate
 from bluefoot_mpc.model.legs import IkResult
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.types import BodyState, FloatArray, PostureReference, SensorFrame
@@ -72,7 +72,8 @@ class LevelStage:
         """
         known = not math.isnan(wish.heading)
         inputs = LevelingInputs(
-            estimate=estimate, tilt_reference=wish.tilt,
+            estimate=estimate, turn_rate=newest_rate(frame.imu, estimate.angular_velocity),
+            tilt_reference=wish.tilt,
             heading_error=wrap_angle(float(estimate.rpy[2]) - wish.heading) if known else 0.0,
             goals=goals, specific_force=specific_force(frame.imu),
             voltage=wish.voltage, walking=wish.walking,

@@ -90,7 +90,7 @@ class Compensator:
             dt: s, since the last tick.
         """
         estimate = inputs.estimate
-        speed = velocity(estimate)
+        speed = velocity(inputs)
         q = np.concatenate([estimate.position, estimate.quaternion, estimate.joint_position])
         dynamics = self._mass(q, estimate)
         target = self._measured(dynamics, inputs, speed, dt)
@@ -187,7 +187,7 @@ class Compensator:
         if config.attitude:
             roll, pitch = (estimate.rpy[:2] - inputs.tilt_reference).tolist()
             tilt = np.array([roll, pitch, inputs.heading_error])
-            unwanted = unwanted + self._tilt_gain * tilt + self._rate_gain * estimate.angular_velocity
+            unwanted = unwanted + self._tilt_gain * tilt + self._rate_gain * inputs.turn_rate
         if config.form == "residual" and config.psi != "zero":
             # The controller's goals make torque already: what they do about ψ is not to be done twice.
             ahead = inputs.goals - estimate.joint_position

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bluefoot_mpc.types import N_JOINTS, N_LEGS, BodyState, FloatArray
+from bluefoot_mpc.types import N_JOINTS, N_LEGS, BodyState, FloatArray, ImuBatch
 
 OUTPUTS = 22
 """ψ: force and moment on the trunk, torques on the joints."""
@@ -32,6 +32,7 @@ class LevelingInputs:
 
     Attributes:
         estimate: state estimate.
+        turn_rate: (3,) rad/s, angular velocity of the trunk at the frame's time, base frame.
         tilt_reference: (2,) rad, commanded roll and pitch.
         heading_error: rad, estimated heading less the commanded one.
         goals: (16,) rad, joint goals of the gait or controller.
@@ -41,6 +42,7 @@ class LevelingInputs:
     """
 
     estimate: BodyState
+    turn_rate: FloatArray
     tilt_reference: FloatArray
     heading_error: float
     goals: FloatArray
@@ -49,9 +51,28 @@ class LevelingInputs:
     walking: bool
 
 
-def velocity(estimate: BodyState) -> FloatArray:
+def newest_rate(imu: ImuBatch, mean: FloatArray) -> FloatArray:
+    """(3,) rad/s, angular velocity at the end of a batch, base frame.
+
+    The estimate is the mean over the frame, half a period old. That is too late
+    here: of a trot's angular accelerations, differences of means from frame to
+    frame miss four fifths, differences of last samples a quarter.
+
+    Args:
+        imu: the frame's samples.
+        mean: (3,) rad/s, their mean without the bias, as estimated.
+    """
+    usable = imu.gyro[imu.valid]
+    if not len(usable):
+        return mean
+    newest: FloatArray = usable[-1] - usable.sum(axis=0) / len(usable) + mean
+    return newest
+
+
+def velocity(inputs: LevelingInputs) -> FloatArray:
     """(22,) z2: trunk twist in the base frame, joint speeds; m/s, rad/s."""
-    return np.concatenate([estimate.linear_velocity, estimate.angular_velocity, estimate.joint_velocity])
+    estimate = inputs.estimate
+    return np.concatenate([estimate.linear_velocity, inputs.turn_rate, estimate.joint_velocity])
 
 
 def network_inputs(
