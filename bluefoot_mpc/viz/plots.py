@@ -89,6 +89,43 @@ def rows(count: int, titles: list[str], gap: float = 0.09) -> dict[str, Any]:
     return layout
 
 
+def name_rows(layout: dict[str, Any], names: list[str], colours: list[str]) -> None:
+    """Write a name into the upper right corner of each of the plots above each other."""
+    layout["annotations"] = [
+        {
+            "x": 1.0,
+            "y": layout["yaxis" if index == 0 else f"yaxis{index + 1}"]["domain"][1],
+            "xref": "paper",
+            "yref": "paper",
+            "xanchor": "right",
+            "yanchor": "bottom",
+            "text": f"<b>{name}</b>",
+            "showarrow": False,
+            "font": {"size": 12, **({} if colour.startswith("@") else {"color": colour})},
+        }
+        for index, (name, colour) in enumerate(zip(names, colours, strict=True))
+    ]
+
+
+def band(start: float, end: float, colour: str) -> dict[str, Any]:
+    """A shape over the whole height: a stretch of time (s), or a line where it has no length."""
+    if start == end:
+        line = {"color": colour, "width": 1, "dash": "dot"}
+        return {"type": "line", "yref": "paper", "x0": start, "x1": end, "y0": 0, "y1": 1, "line": line}
+    return {
+        "type": "rect",
+        "yref": "paper",
+        "x0": start,
+        "x1": end,
+        "y0": 0,
+        "y1": 1,
+        "fillcolor": colour,
+        "opacity": 0.25,
+        "line": {"width": 0},
+        "layer": "below",
+    }
+
+
 def footfall(series: RunSeries, period: float) -> Panel:
     """Gait diagram: scheduled stance as wide pale bars, contact as narrow full ones."""
     traces: list[Trace] = []

@@ -9,7 +9,7 @@ import numpy as np
 from bluefoot_mpc.types import LEG_JOINTS, LEGS, Fallback, FloatArray
 from bluefoot_mpc.viz.packing import pack
 from bluefoot_mpc.viz.plan_series import PlanSeries
-from bluefoot_mpc.viz.plots import Panel, Trace, curve, gait_window, rows
+from bluefoot_mpc.viz.plots import Panel, Trace, curve, gait_window, name_rows, rows
 from bluefoot_mpc.viz.plots_ground import last_steps, support_outlines
 from bluefoot_mpc.viz.series import RunSeries
 from bluefoot_mpc.viz.style import BAD, COM, COMMAND, ESTIMATE, LEG_COLOURS, LEG_NAMES, WARNING, ZMP
@@ -41,7 +41,7 @@ def forces(series: RunSeries, plans: PlanSeries) -> Panel:
             trace = curve(series.time, values, f"{name} {kind}", colour, axis=axis, width=width)
             traces.append({**trace, "showlegend": False})
         layout["yaxis" if leg == 0 else f"yaxis{leg + 1}"]["rangemode"] = "tozero"
-    _name_rows(layout, [LEG_NAMES[name] for name in LEGS], [LEG_COLOURS[name] for name in LEGS])
+    name_rows(layout, [LEG_NAMES[name] for name in LEGS], [LEG_COLOURS[name] for name in LEGS])
     error = _rms(plans.load - plans.load_truth)
     against = f", black: the true one; they differ by {error:.1f} N RMS" if series.has_truth else ""
     window = _pages(layout, series)
@@ -65,7 +65,7 @@ def planned_torques(series: RunSeries, plans: PlanSeries) -> Panel:
         ):
             trace = curve(series.time, values, kind, colour, axis=axis, width=1.2)
             traces.append({**trace, "legendgroup": kind, "showlegend": index == 0})
-    _name_rows(layout, [name.replace("_", " ") for name in LEG_JOINTS], ["@ink"] * len(LEG_JOINTS))
+    name_rows(layout, [name.replace("_", " ") for name in LEG_JOINTS], ["@ink"] * len(LEG_JOINTS))
     error = _rms(plans.torque - series.torque)
     motor = "what the motors make at the shafts" if series.has_truth else "the load that the servos report"
     window = _pages(layout, series)
@@ -141,23 +141,6 @@ def _pages(layout: dict[str, Any], series: RunSeries) -> float:
     window = gait_window(series)
     layout["xaxis"]["range"] = window
     return window[1] - window[0]
-
-
-def _name_rows(layout: dict[str, Any], names: list[str], colours: list[str]) -> None:
-    layout["annotations"] = [
-        {
-            "x": 1.0,
-            "y": layout["yaxis" if index == 0 else f"yaxis{index + 1}"]["domain"][1],
-            "xref": "paper",
-            "yref": "paper",
-            "xanchor": "right",
-            "yanchor": "bottom",
-            "text": f"<b>{name}</b>",
-            "showarrow": False,
-            "font": {"size": 12, **({} if colour.startswith("@") else {"color": colour})},
-        }
-        for index, (name, colour) in enumerate(zip(names, colours, strict=True))
-    ]
 
 
 def _rms(values: FloatArray) -> float:

@@ -9,8 +9,9 @@ from typing import Any
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.settings import dump_toml
-from bluefoot_mpc.viz import plots, plots_ground, plots_machine, plots_plan
+from bluefoot_mpc.viz import plots, plots_ground, plots_level, plots_machine, plots_plan
 from bluefoot_mpc.viz.animation import animation_data, viewer_script
+from bluefoot_mpc.viz.level_series import extract_leveling
 from bluefoot_mpc.viz.packing import stretches
 from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
 from bluefoot_mpc.viz.plan_series import extract_plans
@@ -55,7 +56,7 @@ def report_html(
     stall_torque = robot.parameters.servo.stall_torque
     series = extract(run, stall_torque)
     has_ticks = len(series.time) > 0
-    panels = _panels(run, series, stall_torque) if has_ticks else []
+    panels = _panels(run, series, stall_torque, summary.get("figures") or {}) if has_ticks else []
     judged = verdict(summary, checks)
     data = animation_data(build_scene(robot), series, robot.parameters.legs.foot_radius) if has_ticks else {}
     return render(
@@ -83,10 +84,11 @@ def report_html(
     )
 
 
-def _panels(run: RunData, series: RunSeries, stall_torque: float) -> list[Panel]:
-    period, plans = run.period, extract_plans(run, series)
+def _panels(run: RunData, series: RunSeries, stall_torque: float, figures: Mapping[str, Any]) -> list[Panel]:
+    period, plans, level = run.period, extract_plans(run, series), extract_leveling(run, series)
     return [
         plots.footfall(series, period),
+        *(plots_level.level_panels(series, level, figures) if level is not None else []),
         plots.attitude(series),
         plots_ground.path(series),
         plots_ground.balance(series),
@@ -123,30 +125,12 @@ def _marks(series: RunSeries) -> list[dict[str, Any]]:
     shapes: list[dict[str, Any]] = []
     for k in range(1, len(series.mode)):
         if series.mode[k] != series.mode[k - 1]:
-            shapes.append(_band(float(series.time[k]), float(series.time[k]), NEUTRAL))
-    shapes += [_band(time, time, NEUTRAL) for time, text in series.events if text.startswith("gait ")]
+            shapes.append(plots.band(float(series.time[k]), float(series.time[k]), NEUTRAL))
+    shapes += [plots.band(time, time, NEUTRAL) for time, text in series.events if text.startswith("gait ")]
     pushed = (series.push != 0.0).any(axis=1)
     step = float(series.time[1] - series.time[0]) if len(series.time) > 1 else 0.0
-    shapes += [_band(start, end, BAD) for start, end in stretches(pushed, series.time, step)]
+    shapes += [plots.band(start, end, BAD) for start, end in stretches(pushed, series.time, step)]
     return shapes
-
-
-def _band(start: float, end: float, colour: str) -> dict[str, Any]:
-    if start == end:
-        line = {"color": colour, "width": 1, "dash": "dot"}
-        return {"type": "line", "yref": "paper", "x0": start, "x1": end, "y0": 0, "y1": 1, "line": line}
-    return {
-        "type": "rect",
-        "yref": "paper",
-        "x0": start,
-        "x1": end,
-        "y0": 0,
-        "y1": 1,
-        "fillcolor": colour,
-        "opacity": 0.25,
-        "line": {"width": 0},
-        "layer": "below",
-    }
 
 
 def _events(series: RunSeries) -> dict[str, Any]:
@@ -190,6 +174,9 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
             continue
         if isinstance(value, Mapping):
             rows += _flat(value, f"{prefix}{key}.")
+        elif isinstance(value, list) and value and all(isinstance(entry, Mapping) for entry in value):
+            for count, entry in enumerate(value, start=1):
+                rows += _flat(entry, f"{prefix}{key}.{count}.")
         else:
             text = f"{value:.6g}" if isinstance(value, float) else "–" if value is None else str(value)
             rows.append((prefix + key, text))
