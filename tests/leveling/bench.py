@@ -84,9 +84,11 @@ def state(
 
 def seen(estimate: BodyState | None = None, **changes) -> LevelingInputs:
     """What the compensator is given on one tick."""
+    estimate = estimate or state()
     inputs = LevelingInputs(
-        estimate=estimate or state(), tilt_reference=np.zeros(2), heading_error=0.0, goals=STANCE + 0.02,
-        specific_force=np.array([0.0, 0.0, 9.81]), voltage=SERVO.nominal_voltage, walking=True,
+        estimate=estimate, turn_rate=estimate.angular_velocity, tilt_reference=np.zeros(2),
+        heading_error=0.0, goals=STANCE + 0.02, specific_force=np.array([0.0, 0.0, 9.81]),
+        voltage=SERVO.nominal_voltage, walking=True,
     )  # fmt: skip
     return replace(inputs, **changes)
 

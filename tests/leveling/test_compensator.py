@@ -1,0 +1,418 @@
+"""The levelling law against a dense formula, what it does to the trunk, and how it enters the goals."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bluefoot_mpc.leveling.config import AttitudeGains, LevelingLimits, ScheduleConfig
+from bluefoot_mpc.leveling.trunk_dynamics import nominal_mass_matrix
+from bluefoot_mpc.model.dynamics import Dynamics
+from tests.leveling.bench import (
+    DT,
+    FRONT,
+    LEFT,
+    NOW,
+    REAR,
+    RIGHT,
+    ROBOT,
+    SERVO,
+    STANCE,
+    SWINGING,
+    WIDE,
+    at,
+    compensator,
+    last,
+    seen,
+    state,
+    told,
+)
+
+DYNAMICS = Dynamics(ROBOT, rotor_inertia=True)
+TURNS, JOINTS = np.eye(22)[3:6], np.eye(22)[:, 6:]  # Γ1, Γ2
+GAINS = AttitudeGains(tilt=900.0, tilt_rate=70.0, heading=50.0, heading_rate=6.0)
+PSI = np.random.default_rng(3).normal(0.0, 1.0, 22) * np.repeat([5.0, 0.5, 0.2], [3, 3, 16])
+MOVED = state(
+    rpy=(0.03, -0.05, 0.4), rate=(0.2, -0.3, 0.1), velocity=(0.1, 0.02, -0.03),
+    joints=STANCE + np.linspace(-0.1, 0.12, 16), speed=np.linspace(-1.0, 2.0, 16),
+)  # fmt: skip
+INPUTS = seen(MOVED, heading_error=-0.08, tilt_reference=np.array([0.01, 0.02]))
+UNWANTED = np.array([900.0 * 0.02 + 70.0 * 0.2, 900.0 * -0.07 + 70.0 * -0.3, 50.0 * -0.08 + 6.0 * 0.1])
+"""K_b θ + K_d dθ/dt of these inputs, 1/s²."""
+
+
+def mass_of(estimate) -> np.ndarray:
+    return DYNAMICS.mass_matrix(
+        np.concatenate([estimate.position, estimate.quaternion, estimate.joint_position])
+    )
+
+
+def dense(mass, unwanted) -> np.ndarray:
+    """-[Γ1 M̂⁻¹ Γ2]† (...) as it stands in the paper."""
+    return -np.linalg.pinv(TURNS @ np.linalg.inv(mass) @ JOINTS) @ unwanted
+
+
+def turned(mass, torque, psi) -> np.ndarray:
+    """(3,) rad/s², what torques and a disturbance make of the trunk."""
+    return np.linalg.solve(mass, JOINTS @ torque + psi)[3:6]
+
+
+# The law.
+
+
+def test_the_torque_is_the_papers_formula_with_the_nominal_matrix(monkeypatch):
+    law, _ = told(monkeypatch, PSI, gains=GAINS, limits=WIDE)
+    mass = nominal_mass_matrix(DYNAMICS, SWINGING)
+    expected = dense(mass, TURNS @ np.linalg.inv(mass) @ PSI + UNWANTED)
+    np.testing.assert_allclose(law.step(INPUTS, DT).report.torque, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_the_torque_is_the_papers_formula_with_pinocchios_matrix(monkeypatch):
+    law, _ = told(monkeypatch, PSI, gains=GAINS, limits=WIDE, mass_matrix="model")
+    mass = mass_of(MOVED)
+    expected = dense(mass, TURNS @ np.linalg.inv(mass) @ PSI + UNWANTED)
+    np.testing.assert_allclose(law.step(INPUTS, DT).report.torque, expected, rtol=1e-9, atol=1e-12)
+    assert np.abs(mass - nominal_mass_matrix(DYNAMICS, SWINGING)).max() > 1e-4
+
+
+def test_with_the_true_mass_matrix_the_trunk_gets_the_wanted_acceleration(monkeypatch):
+    law, _ = told(monkeypatch, PSI, gains=GAINS, limits=WIDE, mass_matrix="model")
+    report = law.step(INPUTS, DT).report
+    mass = mass_of(MOVED)
+    np.testing.assert_allclose(turned(mass, report.torque, PSI), -UNWANTED, rtol=1e-9)
+    np.testing.assert_allclose(report.disturbance, turned(mass, np.zeros(16), PSI), rtol=1e-9)
+
+
+def test_without_feedback_the_disturbance_alone_is_cancelled(monkeypatch):
+    law, _ = told(monkeypatch, PSI, attitude=False, limits=WIDE, mass_matrix="model")
+    torque = law.step(INPUTS, DT).report.torque
+    assert np.abs(torque).max() > 0.01
+    np.testing.assert_allclose(turned(mass_of(MOVED), torque, PSI), 0.0, atol=1e-9)
+
+
+def test_no_torque_is_smaller_for_the_same_acceleration(monkeypatch):
+    law, _ = told(monkeypatch, PSI, gains=GAINS, limits=WIDE, mass_matrix="model")
+    torque = law.step(INPUTS, DT).report.torque
+    reach = TURNS @ np.linalg.inv(mass_of(MOVED)) @ JOINTS
+    _, _, rows = np.linalg.svd(reach)
+    np.testing.assert_allclose(rows[3:] @ torque, 0.0, atol=1e-9)
+
+
+def test_without_attitude_and_disturbance_there_is_no_torque():
+    law = compensator(attitude=False, psi="zero")
+    np.testing.assert_array_equal(law.step(INPUTS, DT).report.torque, 0.0)
+
+
+def test_a_heading_without_gain_does_nothing():
+    torques = [
+        compensator(psi="zero")
+        .step(seen(state(rate=(0.0, 0.0, rate)), heading_error=error), DT)
+        .report.torque
+        for error, rate in ((0.0, 0.0), (0.5, 0.0), (0.0, 0.7))
+    ]
+    np.testing.assert_array_equal(torques[0], 0.0)
+    np.testing.assert_allclose(torques[1], 0.0, atol=1e-12)
+    np.testing.assert_allclose(torques[2], 0.0, atol=1e-12)
+
+
+def test_a_heading_with_gain_is_turned_back():
+    law = compensator(psi="zero", gains=replace(GAINS, tilt=0.0, tilt_rate=0.0), mass_matrix="model")
+    inputs = seen(heading_error=0.3)
+    np.testing.assert_allclose(
+        turned(mass_of(inputs.estimate), law.step(inputs, DT).report.torque, np.zeros(22)),
+        [0.0, 0.0, -50.0 * 0.3],
+        atol=1e-9,
+    )
+
+
+def test_a_commanded_tilt_is_no_error():
+    tilted = seen(state(rpy=(0.1, -0.05, 0.0)), tilt_reference=np.array([0.1, -0.05]))
+    report = compensator(psi="zero").step(tilted, DT).report
+    np.testing.assert_allclose(report.torque, 0.0, atol=1e-12)
+
+
+def foot_heights(leveled, inputs) -> np.ndarray:
+    """(4,) m, how much further the levelled goals press each foot down than the gait's own."""
+    joints = (inputs.goals, leveled.goals)
+    low = [DYNAMICS.foot_positions(np.concatenate([np.zeros(6), [1.0], q]))[:, 2] for q in joints]
+    return low[0] - low[1]
+
+
+@pytest.mark.parametrize("form", ["mixed", "residual"])
+@pytest.mark.parametrize(
+    ("rpy", "rate", "down", "up"),
+    [
+        ((0.03, 0.0, 0.0), (0.0, 0.0, 0.0), RIGHT, LEFT),
+        ((-0.03, 0.0, 0.0), (0.0, 0.0, 0.0), LEFT, RIGHT),
+        ((0.0, 0.03, 0.0), (0.0, 0.0, 0.0), FRONT, REAR),
+        ((0.0, -0.03, 0.0), (0.0, 0.0, 0.0), REAR, FRONT),
+        ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), RIGHT, LEFT),
+        ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), FRONT, REAR),
+    ],
+)
+def test_the_legs_on_the_side_that_sinks_are_extended(form, rpy, rate, down, up):
+    inputs = seen(state(rpy=rpy, rate=rate), goals=STANCE)
+    law = compensator(psi="zero", form=form)
+    leveled = law.step(inputs, DT)
+    extended = foot_heights(leveled, inputs)
+    assert extended[down].min() > 1e-4
+    assert extended[up].max() < -1e-4
+    turn = turned(mass_of(inputs.estimate), leveled.report.torque, np.zeros(22))
+    assert turn @ (np.array(rpy) + np.array(rate)) < 0.0  # against it
+
+
+# Into the goals.
+
+
+def test_the_goals_are_mixed_as_the_paper_mixes():
+    law = compensator(psi="zero", gains=GAINS, limits=WIDE, mix=0.35)
+    leveled = law.step(INPUTS, DT)
+    wanted = MOVED.joint_position + leveled.report.torque / SERVO.stiffness
+    np.testing.assert_allclose(leveled.goals, 0.65 * INPUTS.goals + 0.35 * wanted, atol=1e-14)
+    assert leveled.report.share == 1.0
+
+
+def test_plain_mixing_makes_the_servos_softer():
+    law = compensator(psi="zero", attitude=False, limits=WIDE, mix=0.25)
+    leveled = law.step(INPUTS, DT)
+    np.testing.assert_allclose(leveled.goals, 0.75 * INPUTS.goals + 0.25 * MOVED.joint_position, atol=1e-14)
+
+
+def test_a_residual_is_added_to_the_goals():
+    law = compensator(psi="zero", form="residual", gains=GAINS, limits=WIDE, mix=0.25)
+    leveled = law.step(INPUTS, DT)
+    np.testing.assert_allclose(
+        leveled.goals - INPUTS.goals, 0.25 * leveled.report.torque / SERVO.stiffness, atol=1e-14
+    )
+
+
+def test_a_residual_does_not_repeat_what_the_goals_do_already(monkeypatch):
+    law, _ = told(monkeypatch, PSI, form="residual", attitude=False, limits=WIDE, mass_matrix="model")
+    torque = law.step(INPUTS, DT).report.torque
+    made = SERVO.stiffness * (INPUTS.goals - MOVED.joint_position) - SERVO.back_emf * MOVED.joint_velocity
+    np.testing.assert_allclose(turned(mass_of(MOVED), torque + made, PSI), 0.0, atol=1e-9)
+
+
+def test_a_low_battery_takes_further_goals_for_the_same_torque():
+    full = compensator(psi="zero", gains=GAINS, limits=WIDE, form="residual").step(INPUTS, DT)
+    low = compensator(psi="zero", gains=GAINS, limits=WIDE, form="residual")
+    low = low.step(replace(INPUTS, voltage=10.0), DT)
+    np.testing.assert_array_equal(low.report.torque, full.report.torque)
+    shift = low.goals - INPUTS.goals
+    np.testing.assert_allclose(shift, (full.goals - INPUTS.goals) * SERVO.nominal_voltage / 10.0, rtol=1e-9)
+
+
+def test_it_fades_in_and_out_over_the_stated_time():
+    schedule = ScheduleConfig(fade=0.1)
+    law = compensator(psi="zero", schedule=schedule)
+    shares = [law.step(INPUTS, DT).report.share for _ in range(7)]
+    np.testing.assert_allclose(shares, [0.2, 0.4, 0.6, 0.8, 1.0, 1.0, 1.0])
+    shares = [law.step(replace(INPUTS, walking=False), DT).report.share for _ in range(6)]
+    np.testing.assert_allclose(shares, [0.8, 0.6, 0.4, 0.2, 0.0, 0.0], atol=1e-12)
+
+
+def test_while_it_fades_it_acts_in_proportion():
+    law = compensator(psi="zero", gains=GAINS, limits=WIDE, schedule=ScheduleConfig(fade=0.1))
+    shift = [law.step(INPUTS, DT).goals - INPUTS.goals for _ in range(5)]
+    for k in range(4):
+        np.testing.assert_allclose(shift[k], 0.2 * (k + 1) * shift[4], atol=1e-14)
+
+
+@pytest.mark.parametrize("psi", ["zero", "persistence", "model", "network"])
+def test_without_walking_the_goals_are_those_of_the_gait(psi):
+    law = compensator(psi=psi)
+    for _ in range(5):
+        leveled = law.step(replace(INPUTS, walking=False), DT)
+        np.testing.assert_array_equal(leveled.goals, INPUTS.goals)
+        assert leveled.report.share == 0.0
+
+
+# The measured target, seen from outside.
+
+
+def test_the_target_of_a_period_is_known_one_tick_after_its_goals_were(monkeypatch):
+    law, source = told(monkeypatch, PSI, delay_ticks=1)
+    last(law, INPUTS, 4)
+    assert [situation.target is None for situation in source.seen] == [True, True, False, False]
+
+
+def test_the_target_is_that_of_the_servo_law_on_the_goals_that_were_sent(monkeypatch):
+    law, source = told(monkeypatch, PSI, delay_ticks=0, mass_matrix="model", mix=0.25, limits=WIDE)
+    first = law.step(seen(state(), walking=False, goals=STANCE + 0.05), DT)
+    after = state(velocity=(0.02, 0.0, -0.01), rate=(0.1, 0.0, 0.0), joints=STANCE + 0.01, speed=0.5)
+    report = law.step(seen(after, walking=False), DT).report
+    error = first.goals - (STANCE + 0.005)
+    beyond = np.abs(error) / SERVO.step_angle - SERVO.compliance_margin
+    duty = SERVO.punch / 1023.0 + beyond / SERVO.compliance_slope
+    torque = np.sign(error) * np.minimum(duty, 1.0) * SERVO.stall_torque - SERVO.back_emf * 0.5
+    change = np.concatenate([after.linear_velocity, after.angular_velocity, after.joint_velocity])
+    expected = mass_of(after) @ change / DT - JOINTS @ torque
+    np.testing.assert_allclose(source.seen[-1].target, expected, rtol=1e-9)
+    np.testing.assert_allclose(report.measured, TURNS @ np.linalg.solve(mass_of(after), expected), rtol=1e-9)
+
+
+# What cannot be used.
+
+
+def test_a_believed_disturbance_is_bounded(monkeypatch):
+    law, _ = told(monkeypatch, np.full(22, 1e6), limits=LevelingLimits(disturbance=40.0))
+    report = law.step(INPUTS, DT).report
+    np.testing.assert_array_equal(np.abs(report.disturbance), 40.0)
+
+
+@pytest.mark.parametrize("size", [1e3, 1e6, 1e300])
+def test_no_goal_is_moved_further_than_allowed(monkeypatch, size):
+    law, _ = told(monkeypatch, np.full(22, size), limits=LevelingLimits(shift=0.11, disturbance=1e9))
+    for _ in range(60):
+        goals = law.step(INPUTS, DT).goals
+        assert np.abs(goals - INPUTS.goals).max() <= 0.11 + 1e-12
+
+
+def test_goals_that_stay_at_their_limit_stop_it_for_good(monkeypatch):
+    law, source = told(
+        monkeypatch, np.full(22, 1e6), limits=LevelingLimits(shift=0.05, disturbance=1e9, clamped=0.2)
+    )
+    reports = [law.step(INPUTS, DT).report for _ in range(20)]
+    stopped = next(k for k, report in enumerate(reports) if report.stopped)
+    assert 0.2 <= (stopped + 1) * DT <= 0.26
+    assert "limits" in reports[-1].stopped
+    source.psi = np.zeros(22)
+    assert last(law, INPUTS, 200).report.share == 0.0
+    law.reset()
+    assert law.step(INPUTS, DT).report.share == 1.0
+
+
+def test_a_source_without_an_answer_is_not_acted_on(monkeypatch):
+    law, source = told(monkeypatch, PSI)
+    assert last(law, INPUTS).report.share == 1.0
+    source.psi = None
+    leveled = law.step(INPUTS, DT)
+    assert leveled.report.share == 0.0
+    assert leveled.report.stopped == "nothing predicts the disturbance"
+    np.testing.assert_array_equal(leveled.goals, INPUTS.goals)
+    source.psi = PSI
+    shares = [law.step(INPUTS, DT).report.share for _ in range(60)]
+    assert shares[40] == 0.0
+    assert shares[-1] == 1.0
+
+
+def test_a_fault_of_the_source_stops_it_until_reset(monkeypatch):
+    law, source = told(monkeypatch, PSI)
+    last(law, INPUTS)
+    source.fault = "broken"
+    assert last(law, INPUTS, 2).report.stopped == "broken"
+    source.fault = ""
+    leveled = last(law, INPUTS, 200)
+    assert (leveled.report.share, leveled.report.stopped) == (0.0, "broken")
+    np.testing.assert_array_equal(leveled.goals, INPUTS.goals)
+
+
+def blind(inputs):
+    nan = np.full(3, np.nan)
+    unknown = replace(inputs.estimate, rpy=nan, quaternion=np.full(4, np.nan), healthy=False)
+    return replace(inputs, estimate=unknown)
+
+
+BROKEN = {
+    "unhealthy": lambda inputs: replace(inputs, estimate=replace(inputs.estimate, healthy=False)),
+    "blind": blind,
+    "tilt": lambda inputs: replace(inputs, estimate=replace(inputs.estimate, rpy=np.full(3, np.nan))),
+    "rate": lambda inputs: replace(inputs, turn_rate=np.full(3, np.nan)),
+    "velocity": lambda i: replace(i, estimate=replace(i.estimate, linear_velocity=np.full(3, np.nan))),
+    "joints": lambda i: replace(i, estimate=replace(i.estimate, joint_position=np.full(16, np.nan))),
+    "speeds": lambda i: replace(i, estimate=replace(i.estimate, joint_velocity=np.full(16, np.nan))),
+    "feet": lambda i: replace(i, estimate=replace(i.estimate, foot_position_in_base=np.full((4, 3), np.nan))),
+    "heading": lambda i: replace(i, heading_error=math.nan),
+    "imu": lambda i: replace(i, specific_force=None),
+    "voltage": lambda i: replace(i, voltage=math.nan),
+}
+
+
+@pytest.mark.parametrize("form", ["mixed", "residual"])
+@pytest.mark.parametrize("mass_matrix", ["nominal", "model"])
+@pytest.mark.parametrize("psi", ["zero", "persistence", "model", "network"])
+@pytest.mark.parametrize("what", BROKEN)
+def test_bad_inputs_never_reach_the_goals(what, psi, mass_matrix, form):
+    law = compensator(psi=psi, mass_matrix=mass_matrix, form=form)
+    last(law, INPUTS, 5)
+    for _ in range(10):
+        goals = law.step(BROKEN[what](INPUTS), DT).goals
+        assert np.isfinite(goals).all()
+        assert np.abs(goals - INPUTS.goals).max() <= LevelingLimits().shift + 1e-12
+    report = last(law, INPUTS, 60).report
+    assert report.share == 1.0  # and on it goes
+    assert report.stopped == ""
+    for value in (report.disturbance, report.measured, report.torque, report.contact_force):
+        assert np.isfinite(value).all()
+
+
+def test_goals_that_are_no_numbers_are_handed_on_for_the_supervisor_to_refuse():
+    law = compensator(psi="zero")
+    last(law, INPUTS)
+    broken = replace(INPUTS, goals=np.full(16, np.nan))
+    assert np.isnan(law.step(broken, DT).goals).all()
+    leveled = last(law, INPUTS, 5)
+    assert np.isfinite(leveled.goals).all()
+    assert np.isfinite(leveled.report.measured).all()
+
+
+@pytest.mark.parametrize("tilt", [(0.36, 0.0), (0.0, -0.36), (0.26, 0.26)])
+def test_a_large_tilt_pauses_it_and_it_comes_back(tilt):
+    law = compensator(psi="zero", schedule=replace(NOW, fade=0.02))
+    last(law, INPUTS)
+    fallen = seen(state(rpy=(*tilt, 0.0)))
+    leveled = last(law, fallen, 2)
+    assert leveled.report.share == 0.0
+    assert "20 degrees" in leveled.report.stopped
+    shares = [law.step(INPUTS, DT).report.share for _ in range(60)]
+    assert sum(share == 0.0 for share in shares) == pytest.approx(50, abs=1)
+    assert shares[-1] == 1.0
+
+
+def test_tilts_count_from_the_commanded_one():
+    law = compensator(psi="zero")
+    leaning = seen(state(rpy=(0.3, 0.2, 0.0)), tilt_reference=np.array([0.3, 0.2]))
+    assert last(law, leaning).report.share == 1.0
+
+
+# Reset.
+
+
+def shaken(law, ticks=80):
+    """Commands and reports under inputs that change and fail."""
+    rng, rows = np.random.default_rng(7), []
+    for k in range(ticks):
+        moving = state(
+            rpy=rng.normal(0.0, 0.03, 3), rate=rng.normal(0.0, 0.4, 3), velocity=rng.normal(0.0, 0.1, 3),
+            joints=STANCE + rng.normal(0.0, 0.05, 16), speed=rng.normal(0.0, 1.0, 16),
+        )  # fmt: skip
+        inputs = at(k * DT, seen(moving, goals=STANCE + rng.normal(0.0, 0.05, 16)))
+        leveled = law.step(blind(inputs) if k == 30 else inputs, DT)
+        report = leveled.report
+        rows.append(
+            np.concatenate(
+                [leveled.goals, report.disturbance, report.measured, [report.share, report.mse, report.rate]]
+            )
+        )
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("psi", ["zero", "persistence", "model", "network"])
+@pytest.mark.parametrize("form", ["mixed", "residual"])
+def test_reset_is_the_beginning_bit_for_bit(psi, form):
+    schedule = ScheduleConfig(fade=0.1, off=0.4, on=0.4, learn="always", learn_time=0.2)
+    law = compensator(psi=psi, form=form, schedule=schedule)
+    first = shaken(law)
+    law.reset()
+    np.testing.assert_array_equal(shaken(law), first)
+    np.testing.assert_array_equal(shaken(compensator(psi=psi, form=form, schedule=schedule)), first)
+
+
+def test_what_it_was_given_stays_as_it_was():
+    law = compensator(psi="network", schedule=replace(NOW, learn="always"))
+    inputs = seen(MOVED)
+    goals, joints = inputs.goals.copy(), MOVED.joint_position.copy()
+    last(law, inputs, 5)
+    np.testing.assert_array_equal(inputs.goals, goals)
+    np.testing.assert_array_equal(MOVED.joint_position, joints)
