@@ -51,6 +51,8 @@ def test_unknown_and_missing_values_are_named():
     [
         lambda: Parameter(name="a", keys=(), low=0.0, high=1.0),
         lambda: Parameter(name="a", keys=("a.b",), low=1.0, high=1.0),
+        lambda: Parameter(name="a", keys=("a.b",), low=0.0, high=1.0, log=True),
+        lambda: Parameter(name="a", keys=("a.b",), low=0.1, high=1.0, step=0.1, log=True),
         lambda: Space(parameters=()),
         lambda: Space(parameters=(HEIGHT, HEIGHT)),
         lambda: trot_space("magic"),

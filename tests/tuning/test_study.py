@@ -92,6 +92,17 @@ def test_controller_and_every_case_reach_the_simulator():
     assert set(result.figures) == {"made up", "other"}
 
 
+def test_another_judge_may_make_the_cost():
+    def judge(cases, seen):
+        assert [case.name for case in cases] == list(seen) == ["made up"]
+        return 7.0 - seen["made up"][0].roll
+
+    result = run_study(config(), SPACE, [CASE], evaluate=Bowl(), judge=judge)
+    # The steepest tilt now is the best: the corner that is farthest from the bowl's bottom.
+    assert result.cost < 7.0 - 2.0
+    assert result.values["b"] < -0.5
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
