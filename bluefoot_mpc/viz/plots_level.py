@@ -55,9 +55,7 @@ def attitude(series: RunSeries, level: LevelSeries) -> Panel:
             f"{name} {without[k]:.2f}° and {with_it[k]:.2f}° ({change[k]:+.0f} %)"
             for k, name in enumerate(_AXES[:2])
         )
-        caption += (
-            ". The windows' own figures leave out the first steps." if level.stopped.sum() == 0 else "."
-        )
+        caption += "."
     if level.stopped.any():
         caption += f" Red: it has disengaged itself, at {series.time[level.stopped][0]:.1f} s."
     return Panel(
@@ -89,7 +87,7 @@ def windows(told: Sequence[Mapping[str, Any]]) -> Panel:
     return Panel(
         key="level-windows", title="Levelling by window",
         caption=f"RMS of the true attitude against the command, whole windows; full colour: on.{against}",
-        data=traces, height=300, time=False,
+        data=traces, height=340, time=False,
         layout={
             "barmode": "group", "xaxis": {},
             "yaxis": {"title": {"text": "degrees RMS"}, "rangemode": "tozero"},
@@ -98,18 +96,21 @@ def windows(told: Sequence[Mapping[str, Any]]) -> Panel:
 
 
 def learning(series: RunSeries, level: LevelSeries) -> Panel:
-    """Squared error and learning rate of the network, both on log axes."""
+    """Squared error and learning rate of the network while it walks, both on log axes."""
     lines = (("squared error", level.mse, ESTIMATE, "y"), ("learning rate", level.rate, COMMAND, "y2"))
     traces: list[Trace] = [
-        {**curve(series.time, np.where(v > 0.0, v, np.nan), name, colour, axis=axis), "showlegend": False}
+        {
+            **curve(series.time, np.where(series.walking & (v > 0.0), v, np.nan), name, colour, axis=axis),
+            "showlegend": False,
+        }
         for name, v, colour, axis in lines
     ]
     layout = _shaded(rows(2, ["squared error, scaled", "learning rate"], gap=0.12), series, level)
-    layout["yaxis"] |= {"type": "log", "exponentformat": "power"}
-    layout["yaxis2"] |= {"type": "log", "exponentformat": "power"}
+    for axis in ("yaxis", "yaxis2"):
+        layout[axis] |= {"type": "log", "nticks": 5}
     learns = 100.0 * float(np.mean(level.training[series.walking])) if series.walking.any() else 0.0
     return Panel(
-        key="level-learning", title="What the network learns", data=traces, layout=layout, height=300,
+        key="level-learning", title="What the network learns", data=traces, layout=layout, height=340,
         caption=f"Low-passed squared error of one prediction, and the bold driver's rate. It learns in "
         f"{learns:.0f} % of the ticks that it walks; shaded: levelling acts."
         f"{_errors(level)}",
