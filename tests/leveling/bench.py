@@ -40,7 +40,7 @@ class Told:
     mse = rate = math.nan
     ready = True
     fault = doubt = ""
-    learnt = None
+    weights = None
 
     def __init__(self, psi: FloatArray | None = None) -> None:
         self.psi, self.seen = psi, []
