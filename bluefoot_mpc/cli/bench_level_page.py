@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
+from rich.padding import Padding
 from rich.table import Table
 
 from bluefoot_mpc.viz.bench_level import credit_line, lower, ratio_text
@@ -26,7 +27,7 @@ def level_pages(level: Mapping[str, Any]) -> list[RenderableType]:
     parts.append(_pairs(level["parts"]))
     if level["credits"]:
         verdicts = {level["cases"][credit["case"]]: credit["verdict"] for credit in level["credits"]}
-        parts += ["\nWhat the network adds", _pairs(verdicts), f"\n{credit_line(level)}\n"]
+        parts += ["\nWhat the network adds", _pairs(verdicts), Padding(credit_line(level), (1, 0))]
     return parts
 
 

@@ -20,6 +20,7 @@ _DID = {
     "transition": "changed its gait while walking",
     "push": "withstood the push",
     "drive": "was driven",
+    "level": "levelled its trunk",
 }
 
 

@@ -9,6 +9,8 @@ from bluefoot_mpc.cli import bench_plan
 from bluefoot_mpc.cli.arguments import BenchCommand
 from bluefoot_mpc.cli.main import main
 from bluefoot_mpc.evaluation import battery as battery_module
+from bluefoot_mpc.evaluation.level_ablation import SHOWN
+from bluefoot_mpc.evaluation.level_cases import DEFAULT_CASES
 from bluefoot_mpc.evaluation.timing import Timing
 from tests.viz.html_check import PageReader
 
@@ -125,11 +127,92 @@ def test_wrong_use_is_told_with_what_is_valid(runs, capfd, words, message):
     assert runs == []
 
 
+@pytest.fixture
+def level_runs(monkeypatch):
+    """Levelling that leaves half of the tilt, with the network a third."""
+    seen = []
+
+    def measure(case, seed):
+        seen.append((case.name, seed))
+        on = 1.0 if "control.leveling.psi=network" in case.options["overrides"] else 1.5
+        figures = dict.fromkeys(SHOWN, 3.0)
+        figures |= {f"on_{axis}_rms_deg": on + 0.01 * seed for axis in ("roll", "pitch", "tilt")}
+        figures |= {
+            f"{axis}_reduction_percent": 100.0 * (1.0 - on / 3.0) for axis in ("roll", "pitch", "tilt")
+        }
+        return {"falls": 0.0, "disengaged": 0.0, **figures}
+
+    monkeypatch.setattr(battery_module, "measure", measure)
+    return seen
+
+
+def test_the_parts_of_levelling_are_one_command(capfd, tmp_path, level_runs):
+    out = tmp_path / "out"
+    words = ["bench", "--parts", "level", "--cases", "level-60,level-mpc-60", "--workers", "1"]
+    words += ["--out", str(out)]
+    assert main([*words, "--json"]) == 0
+    data = json.loads(capfd.readouterr().out)
+    assert {row["part"] for row in data["level"]["rows"]} == set(data["level"]["parts"])
+    assert [credit["credited"] for credit in data["level"]["credits"]] == [True, True]
+    assert data["variants"] == {}
+    assert data["ablation"] == []
+    done = len(level_runs)
+    assert main(words) == 0
+    assert len(level_runs) == done
+    shown = capfd.readouterr().out
+    assert "0.67 [0.67, 0.67]" in shown
+    assert "2 of 2 cases" in shown.replace("\n", " ")
+    assert max(map(len, shown.splitlines())) <= max(80, len(str(out)) + 20)
+    page = PageReader((out / "bench.html").read_text(encoding="utf-8"))
+    assert page.open == []
+    assert page.references == []
+    assert {"level-roll", "level-pitch", "level-credit", "level", "limits"} <= set(page.ids)
+    assert "ablation" not in page.ids
+    bars = json.loads(page.texts["figures"])["level-roll"]["data"]
+    assert [bar["name"] for bar in bars] == ["mix", "pd", "narx", "network", "persistence", "model"]
+    assert bars[1]["y"] == [50.0, 50.0]
+
+
+def plan(**words):
+    return bench_plan.plan_of(BenchCommand(**words))
+
+
+def test_each_part_takes_its_own_cases_and_rows():
+    both = plan(parts="ablation,level", cases="payload,level-payload", variants="mpc,pd,narx")
+    assert (list(both.cases), list(both.level_cases)) == (["payload"], ["level-payload"])
+    assert [row.name for row in both.rows] == ["mpc"]
+    assert [part.name for part in both.level_parts] == ["pd", "narx"]
+    alone = plan(parts="level", variants="pd")
+    assert alone.cases == {}
+    assert list(alone.level_cases) == list(DEFAULT_CASES)
+    assert not alone.needs_variants
+    assert len(plan(parts="level", cases="all").level_cases) == 20
+    assert list(plan(parts="ablation").cases) == list(bench_plan.ABLATION_CASES)
+    assert plan(parts="ablation", duration=10.0).level_cases == {}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--parts", "level", "--cases", "payload"], "level-payload"),
+        (["--parts", "level", "--cases", "level-61"], "level-60"),
+        (["--parts", "ablation,level", "--cases", "payload"], "no case of level"),
+        (["--parts", "level", "--variants", "cpg"], "persistence"),
+        (["--parts", "level", "--duration", "20"], "take 24 or more"),
+    ],
+)
+def test_wrong_use_of_the_part_level_is_told(level_runs, capfd, words, message):
+    assert main(["bench", *words]) == 2
+    assert message in capfd.readouterr().err
+    assert level_runs == []
+
+
 def test_full_asks_for_everything(capfd):
     command = BenchCommand(full=True, cases="payload", parts="timing", seeds=1)
     plan = bench_plan.plan_of(command)
     assert plan.parts == bench_plan.PARTS
     assert len(plan.cases) > 10
+    assert len(plan.level_cases) > 10
     assert plan.pushes.seeds == bench_plan.FULL_SEEDS
     assert len(plan.cases["push-2"].seeds) == 240
 
