@@ -75,8 +75,8 @@ class LevelStage:
             estimate=estimate, turn_rate=newest_rate(frame.imu, estimate.angular_velocity),
             tilt_reference=wish.tilt,
             heading_error=wrap_angle(float(estimate.rpy[2]) - wish.heading) if known else 0.0,
-            goals=goals, specific_force=specific_force(frame.imu),
-            voltage=wish.voltage, walking=wish.walking,
+            goals=goals, joint_load=np.where(frame.joint_valid, frame.joint_load, np.nan),
+            specific_force=specific_force(frame.imu), voltage=wish.voltage, walking=wish.walking,
         )  # fmt: skip
         leveled = self.compensator.step(inputs, dt)
         before, self._stopped = self._stopped, leveled.report.stopped

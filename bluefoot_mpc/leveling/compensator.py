@@ -97,6 +97,8 @@ class Compensator:
         learning = inputs.walking and schedule.may_learn(self._share, self._config.schedule)
         situation = self._situation(inputs, q, speed, target, learn=learning)
         predicted = self._source.step(situation, dt)
+        if predicted is not None and not np.isfinite(predicted).all():
+            predicted = None
         self._engage(inputs, predicted, dt)
         psi = self._bounded(dynamics, predicted)
         torque = self._torque(dynamics, inputs, psi)
@@ -127,8 +129,8 @@ class Compensator:
     ) -> FloatArray | None:
         """(22,) ψ of the period that just ended; None where a part of it is unknown."""
         estimate = inputs.estimate
-        torque = self._made.torque(estimate.joint_position, estimate.joint_velocity, inputs.voltage)
-        if torque is None or self._before is None:
+        torque = self._made.torque(estimate.joint_position, inputs.joint_load, inputs.voltage, dt)
+        if torque is None or self._before is None or not np.isfinite(speed).all():
             return None
         target = disturbance(dynamics.mass, self._before, speed, torque, dt)
         return target if np.isfinite(target).all() else None

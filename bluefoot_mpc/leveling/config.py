@@ -80,7 +80,7 @@ class LevelingConfig:
     form: Literal["mixed", "residual"] = "mixed"  # as the paper mixes, or added to the goals of a controller
     mass_matrix: Literal["nominal", "model"] = "nominal"  # averaged over a gait, or Pinocchio's M(q)
     gains: AttitudeGains = field(default_factory=AttitudeGains)
-    delay_ticks: int = 1  # command periods from command to servo, for the torque that the servos made
+    delay_ticks: int = 1  # command periods from command to servo, for servos that do not report their load
     weights: str = ""  # file with the network's weights; empty: it begins untrained
     schedule: ScheduleConfig = field(default_factory=ScheduleConfig)
     limits: LevelingLimits = field(default_factory=LevelingLimits)

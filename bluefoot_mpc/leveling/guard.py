@@ -54,7 +54,7 @@ class Guard:
         if fault:
             self._stop(fault)
         elif doubt:
-            self.stopped, self._pause = doubt, PAUSE
+            self.stopped, self._pause, self._clamped = doubt, PAUSE, 0.0
         elif self._pause > 0.0:
             self._pause -= dt
             self.stopped = self.stopped if self._pause > 0.0 else ""

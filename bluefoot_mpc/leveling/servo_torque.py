@@ -1,4 +1,4 @@
-"""What torque the servos made: their own law on the goals that were in force."""
+"""What torque the servos made over the last period: by the load they report, or by the goals they had."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ from bluefoot_mpc.types import N_JOINTS, FloatArray
 
 
 class ServoTorque:
-    """Remembers goals until they reach the servos, and gives the torque that followed.
+    """Gives the torque of the period that just ended, servo by servo.
+
+    A reported load is the motor's duty cycle, whatever the latency of goals. A
+    servo that reports none is taken to follow its own law on the goal that was
+    in force, one latency old.
 
     Args:
         servo: parameters.
@@ -19,37 +23,38 @@ class ServoTorque:
 
     def __init__(self, servo: ServoParameters, delay: int) -> None:
         self._servo = servo
-        self._goals = np.zeros((delay + 1, N_JOINTS))
-        self._before = np.zeros(N_JOINTS)
-        self.reset()
+        self._goals = np.full((delay + 1, N_JOINTS), np.nan)
+        self._position = np.full(N_JOINTS, np.nan)
+        self._load = np.full(N_JOINTS, np.nan)
 
     def reset(self) -> None:
-        """Forget goals and positions."""
-        self._goals[:] = 0.0
-        self._before[:] = 0.0
-        self._sent = 0
-        self._seen = False
+        """Forget goals, positions and loads."""
+        for memory in (self._goals, self._position, self._load):
+            memory[...] = np.nan
 
-    def torque(self, position: FloatArray, speed: FloatArray, voltage: float) -> FloatArray | None:
-        """(16,) N·m, motor torque over the period that just ended; None while the goals in it are unknown.
+    def torque(self, position: FloatArray, load: FloatArray, voltage: float, dt: float) -> FloatArray | None:
+        """(16,) N·m, mean motor torque over the period that just ended; None while one is unknown.
 
         Args:
             position: (16,) rad, joints now.
-            speed: (16,) rad/s, joints now.
+            load: (16,) duty as reported now, NaN where no report came.
             voltage: V at the servos.
+            dt: s, length of the period.
         """
-        known = self._seen and self._sent >= len(self._goals)
-        made = None
-        if known:
-            middle = 0.5 * (self._before + position)
-            counts = (self._goals[0] - middle) / self._servo.step_angle
-            made = motor_torque(self._servo, duty(self._servo, counts), speed, voltage)
-        self._before[:] = position
-        self._seen = True
-        return made
+        servo = self._servo
+        middle = 0.5 * (self._position + position)
+        speed = (position - self._position) / dt
+        driven = 0.5 * (self._load + load)
+        silent = np.isnan(driven)
+        if silent.any():
+            # The servo's law answers zero to an error that is no number.
+            error = (self._goals[0] - middle) / servo.step_angle
+            driven = np.where(silent, np.where(np.isnan(error), np.nan, duty(servo, error)), driven)
+        self._position[:], self._load[:] = position, load
+        made = motor_torque(servo, driven, speed, voltage)
+        return made if np.isfinite(made).all() else None
 
     def send(self, goals: FloatArray) -> None:
         """Take the (16,) rad goals that are sent now."""
         self._goals[:-1] = self._goals[1:]
         self._goals[-1] = goals
-        self._sent = min(self._sent + 1, len(self._goals))

@@ -36,8 +36,9 @@ class LevelingInputs:
         tilt_reference: (2,) rad, commanded roll and pitch.
         heading_error: rad, estimated heading less the commanded one.
         goals: (16,) rad, joint goals of the gait or controller.
+        joint_load: (16,) duty that the servos report, -1..1; NaN where no report came.
         specific_force: (3,) m/s², p̈_b - g, base frame; None where it was not measured.
-        voltage: V at the servos.
+        voltage: V at the servos, above zero.
         walking: True while the gait steps.
     """
 
@@ -46,6 +47,7 @@ class LevelingInputs:
     tilt_reference: FloatArray
     heading_error: float
     goals: FloatArray
+    joint_load: FloatArray
     specific_force: FloatArray | None
     voltage: float
     walking: bool
