@@ -36,7 +36,7 @@ from bluefoot_mpc.tuning.leveling import (
 from bluefoot_mpc.tuning.objective import Figures
 from bluefoot_mpc.tuning.study import FIRST_SEED, StudyConfig, run_study
 
-START = [{"tilt": 9000.0, "tilt_rate": 0.0}, {"tilt": 9000.0, "tilt_rate": 100.0}]
+START = [{"tilt": 9000.0, "tilt_rate": 60.0}, {"tilt": 5000.0, "tilt_rate": 100.0}]
 FIGURES = ("roll", "pitch", "height", "clearance", "speed_error", "torque", "joint_speed")
 
 
