@@ -18,6 +18,8 @@ from bluefoot_mpc.types import FloatArray, LevelReport
 
 SMOOTHING = 0.5
 """s, length of the moving average behind the paper's own measure of the tilt."""
+THROUGHOUT = 0.9
+"""Mean share of levelling in the goals from which it acted in a whole window, the fade apart."""
 _AXES = ("roll", "pitch", "tilt")
 
 
@@ -94,11 +96,12 @@ def level_figures(run: RunData, windows: Sequence[LevelWindow]) -> dict[str, Any
         _pooled([part for part, w in zip(parts, windows, strict=True) if w.on is kind])
         for kind in (False, True)
     )
+    told = _told(run, windows, parts)
     reports = [record.level for record in run.telemetry]
     stopped = [report.stopped for report in reports if report is not None and report.stopped]
     return {
         "leveling": any(report is not None for report in reports),
-        "windows": _told(run, windows, parts),
+        "windows": told,
         "off": off,
         "on": on,
         "reduction_percent": {axis: _reduction(off, on, f"{axis}_rms_deg") for axis in _AXES},
@@ -106,6 +109,9 @@ def level_figures(run: RunData, windows: Sequence[LevelWindow]) -> dict[str, Any
         "smooth_reduction_percent": {axis: _reduction(off, on, f"{axis}_smooth_rms_deg") for axis in _AXES},
         "speed_change_percent": _negative(_reduction(off, on, "speed_mps")),
         "height_change_m": on["height_m"] - off["height_m"] if off and on else None,
+        "partial_windows": sum(
+            row["kind"] == "on" and (row["share_mean"] or 0.0) < THROUGHOUT for row in told
+        ),
         "stopped_ticks": len(stopped),
         "stopped": list(dict.fromkeys(stopped)),
     }
@@ -167,7 +173,7 @@ def _by_axis(error: FloatArray, name: str, measure: Any) -> dict[str, float]:
 
 
 def _told(run: RunData, windows: Sequence[LevelWindow], parts: Sequence[_Part]) -> list[dict[str, Any]]:
-    """Every window for the summary; an on window is compared with the off window before it."""
+    """Every window for the summary; an on window is compared with the one before it, which is off."""
     rows: list[dict[str, Any]] = []
     before: dict[str, Any] = {}
     for window, part in zip(windows, parts, strict=True):
@@ -184,7 +190,7 @@ def _told(run: RunData, windows: Sequence[LevelWindow], parts: Sequence[_Part]) 
                 **_network(run, window),
             }
         )  # fmt: skip
-        before = before if window.on else seen
+        before = seen
     return rows
 
 

@@ -95,6 +95,23 @@ def test_the_network_is_credited_only_where_it_clearly_beats_both(ran, tilts, ch
     assert credit["credited"] == (verdict == "credited")
 
 
+def test_a_mean_that_hangs_on_a_few_robots_earns_no_credit(ran, monkeypatch):
+    measured = battery_module.measure
+
+    def scattered(case, seed):
+        figures = measured(case, seed)
+        if "control.leveling.psi=network" in case.options["overrides"]:
+            figures["on_tilt_rms_deg"] = (0.5, 2.4, 0.6, 2.6, 2.4)[seed]
+        return figures
+
+    monkeypatch.setattr(battery_module, "measure", scattered)
+    (credit,) = credits_of(ablated())
+    ratio = credit["against"]["pd"]["ratio"]
+    assert ratio["value"] < 0.9
+    assert ratio["high"] > 1.0
+    assert not credit["credited"]
+
+
 def test_without_its_rivals_the_network_is_not_judged(ran):
     assert credits_of(ablated(parts=("narx", "pd"))) == []
 

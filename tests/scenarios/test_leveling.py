@@ -148,6 +148,12 @@ def test_figures_are_those_of_the_swing_that_was_put_in():
     assert abs(found["speed_change_percent"]) < 1.0
     assert first["mse"] == pytest.approx(3.98)
     assert first["share_mean"] == 1.0
+    assert found["partial_windows"] == 0
+
+
+def test_a_window_in_which_it_acted_half_the_time_is_told():
+    run = reports(made_up([2.0, 1.0, 2.0, 1.0]), share=lambda time: float(time >= 5.0))
+    assert level_figures(run, windows_of(run, 10.0))["partial_windows"] == 1
 
 
 def test_a_disengaged_compensator_is_told_with_its_reasons():
@@ -193,6 +199,7 @@ def percent(value):
         ({"speed_change_percent": None}, "no slower"),
         ({"height_change_m": -0.0051}, "mm lower"),
         ({"stopped": ["NaN"]}, "disengage"),
+        ({"partial_windows": 1}, "acts throughout its windows"),
         ({"reduction_percent": {"roll": 53.0, "pitch": 49.9, "tilt": 52.0}}, "pitch RMS at least 50 % lower"),
         ({"reduction_percent": {"roll": None, "pitch": 53.0, "tilt": None}}, "roll RMS at least 50 % lower"),
     ],
