@@ -23,7 +23,7 @@ def leveling_figures(figures: Mapping[str, Any]) -> dict[str, float | None]:
     found: dict[str, float | None] = {
         "speed_change_percent": figures["speed_change_percent"],
         "height_change_mm": _scaled(figures["height_change_m"], 1e3),
-        "disengaged": float(figures["stopped_ticks"] > 0),
+        "disengaged": float(figures["stopped_ticks"] > 0 or figures["partial_windows"] > 0),
     }
     for kind in ("off", "on"):
         part = figures[kind] or {}
