@@ -25,6 +25,8 @@ NOW = ScheduleConfig(fade=1e-3, learn_time=0.0)
 """Acts fully from the first tick on."""
 WIDE = LevelingLimits(disturbance=1e9, shift=1e9)
 """Limits that nothing meets."""
+UNKNOWN: FloatArray = np.full(16, np.nan)
+"""(16,) load of servos that report none."""
 SWINGING: FloatArray = STANCE + np.random.default_rng(5).uniform(-0.2, 0.2, (25, 16))
 """(25, 16) rad, joints that stand for a recorded gait."""
 
@@ -87,8 +89,8 @@ def seen(estimate: BodyState | None = None, **changes) -> LevelingInputs:
     estimate = estimate or state()
     inputs = LevelingInputs(
         estimate=estimate, turn_rate=estimate.angular_velocity, tilt_reference=np.zeros(2),
-        heading_error=0.0, goals=STANCE + 0.02, specific_force=np.array([0.0, 0.0, 9.81]),
-        voltage=SERVO.nominal_voltage, walking=True,
+        heading_error=0.0, goals=STANCE + 0.02, joint_load=UNKNOWN,
+        specific_force=np.array([0.0, 0.0, 9.81]), voltage=SERVO.nominal_voltage, walking=True,
     )  # fmt: skip
     return replace(inputs, **changes)
 

@@ -319,11 +319,12 @@ BROKEN = {
     "blind": blind,
     "tilt": lambda inputs: replace(inputs, estimate=replace(inputs.estimate, rpy=np.full(3, np.nan))),
     "rate": lambda inputs: replace(inputs, turn_rate=np.full(3, np.nan)),
-    "velocity": lambda i: replace(i, estimate=replace(i.estimate, linear_velocity=np.full(3, np.nan))),
+    "velocity": lambda i: replace(i, estimate=replace(i.estimate, linear_velocity=np.full(3, np.inf))),
     "joints": lambda i: replace(i, estimate=replace(i.estimate, joint_position=np.full(16, np.nan))),
     "speeds": lambda i: replace(i, estimate=replace(i.estimate, joint_velocity=np.full(16, np.nan))),
     "feet": lambda i: replace(i, estimate=replace(i.estimate, foot_position_in_base=np.full((4, 3), np.nan))),
     "heading": lambda i: replace(i, heading_error=math.nan),
+    "load": lambda i: replace(i, joint_load=np.full(16, np.inf)),
     "imu": lambda i: replace(i, specific_force=None),
     "voltage": lambda i: replace(i, voltage=math.nan),
 }
