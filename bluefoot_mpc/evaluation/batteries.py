@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bluefoot_mpc.evaluation import law_cases, model_cases
+from bluefoot_mpc.evaluation import law_cases, level_cases, model_cases
 from bluefoot_mpc.evaluation.cases import Case
 from bluefoot_mpc.exceptions import UnknownNameError
 
@@ -20,6 +20,7 @@ BATTERIES: dict[str, Callable[[], tuple[Case, ...]]] = {
     "mpc disturbed": model_cases.disturbed_cases,
     "mpc pushes": model_cases.push_battery,
     "mpc manoeuvres": model_cases.manoeuvre_cases,
+    "levelling": level_cases.level_battery,
 }
 """Each function gives the cases of its battery."""
 

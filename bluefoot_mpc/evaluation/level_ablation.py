@@ -12,7 +12,7 @@ from bluefoot_mpc.evaluation.battery import Store, Verdict, run_battery
 from bluefoot_mpc.evaluation.cases import Case
 from bluefoot_mpc.evaluation.comparison import Comparison, compare
 from bluefoot_mpc.evaluation.level_measure import AXES, ON_WINDOWS
-from bluefoot_mpc.evaluation.level_parts import FEEDBACK, NETWORK, PERSISTENCE, LevelPart
+from bluefoot_mpc.evaluation.level_parts import FEEDBACK, NETWORK, PERSISTENCE, LevelPart, with_part
 from bluefoot_mpc.evaluation.tables import limit_rows, spread
 
 COMPARED = tuple(f"on_{axis}_rms_deg" for axis in AXES)
@@ -153,16 +153,11 @@ def _judged(reduction: Mapping[str, float] | None, tilts: Mapping[str, Compariso
 
 def _jobs(cases: Mapping[str, Case], parts: Sequence[LevelPart]) -> list[tuple[str, LevelPart, Case]]:
     return [
-        (name, part, _with(case, part))
+        (name, part, with_part(case, part))
         for name, case in cases.items()
         for part in parts
         if case.options["controller"] in part.controllers
     ]
-
-
-def _with(case: Case, part: LevelPart) -> Case:
-    own = part.overrides(case.options["controller"])
-    return replace(case, options={**case.options, "overrides": (*case.options.get("overrides", ()), *own)})
 
 
 def _standing(verdict: Verdict) -> Verdict:

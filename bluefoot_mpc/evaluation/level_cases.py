@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from bluefoot_mpc.evaluation.cases import Case
+from bluefoot_mpc.evaluation.level_parts import NETWORK, level_parts, with_part
 from bluefoot_mpc.evaluation.limits import Limit
 from bluefoot_mpc.evaluation.model_cases import NO_FALL, PAYLOAD
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
@@ -49,6 +50,12 @@ DISTURBANCES: dict[str, tuple[str, dict[str, Any]]] = {
 def level_cases() -> dict[str, Case]:
     """Every case, by the name that options take."""
     return {**_paper_cases("none"), **_paper_cases("standard"), **_disturbed_cases(), **_residual_cases()}
+
+
+def level_battery() -> tuple[Case, ...]:
+    """Every case, levelled as it is delivered: attitude feedback and the network."""
+    (part,) = level_parts((NETWORK,))
+    return tuple(with_part(case, part) for case in level_cases().values())
 
 
 def chosen_level_cases(names: Sequence[str], seeds: int, duration: float | None) -> dict[str, Case]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from bluefoot_mpc.evaluation.cases import Case
 from bluefoot_mpc.exceptions import UnknownNameError
 
 FEEDBACK, PERSISTENCE, NETWORK = "pd", "persistence", "narx"
@@ -63,6 +64,12 @@ LEVEL_PARTS = (
     ),
 )  # fmt: skip
 """In the order of the tables."""
+
+
+def with_part(case: Case, part: LevelPart) -> Case:
+    """The case, levelled by this part; what the case itself overrides stays."""
+    own = part.overrides(case.options["controller"])
+    return replace(case, options={**case.options, "overrides": (*case.options.get("overrides", ()), *own)})
 
 
 def level_parts(names: tuple[str, ...] = ()) -> tuple[LevelPart, ...]:

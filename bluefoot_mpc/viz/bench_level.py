@@ -18,6 +18,8 @@ LEVEL_HEAD = (
 _COLOURS = {
     "mix": NEUTRAL, "pd": ESTIMATE, "narx": COMMAND, "network": ZMP, "persistence": GOOD, "model": COM,
 }  # fmt: skip
+_FEW = 6
+"""Cases whose titles need no room to slant."""
 _TILT = "on_tilt_rms_deg"
 _DASH = "–"
 
@@ -45,7 +47,7 @@ def reduction_panel(level: Data, axis: str) -> Panel:
             "yaxis": {"title": {"text": "% less RMS"}, "zeroline": True},
             "xaxis": {"automargin": True},
         },
-        height=400,
+        height=400 if len(level["cases"]) <= _FEW else 520,
         wide=True,
         time=False,
     )
