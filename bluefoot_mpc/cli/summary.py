@@ -39,6 +39,7 @@ _FILES = (
     ("log", "log.mcap"),
     ("summary", "summary.json"),
     ("configuration", "config.toml"),
+    ("learnt weights", "narx.npz"),
 )
 
 

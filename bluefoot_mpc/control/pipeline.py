@@ -297,7 +297,7 @@ class Pipeline:
 
     def _voltage(self, frame: SensorFrame) -> float:
         servo = self._robot.parameters.servo
-        known = frame.voltage_valid and frame.voltage > 0.5 * servo.nominal_voltage
+        known = frame.voltage_valid and 0.5 * servo.nominal_voltage < frame.voltage < math.inf
         return frame.voltage if known else servo.nominal_voltage
 
     def _shift_after_push(self, estimate: BodyState, upright: FloatArray) -> FloatArray | None:

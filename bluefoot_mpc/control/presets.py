@@ -14,7 +14,7 @@ from bluefoot_mpc.control.tracking import TrackingConfig
 from bluefoot_mpc.exceptions import UnknownNameError
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.tuned import LEG_LENGTH, TROT, WALK
-from bluefoot_mpc.leveling.config import LevelingConfig
+from bluefoot_mpc.leveling.config import AttitudeGains, LevelingConfig
 from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.zmp.preview.config import PreviewConfig, PreviewWeights
 from bluefoot_mpc.zmp.support import SupportConfig
@@ -44,7 +44,7 @@ def preset(name: str, robot: RobotParameters | None = None) -> ControlConfig:
             ground=GroundAdaptationConfig(enabled=True),
             whole_body=BodyPlannerConfig(enabled=True),
             servo=ServoMapConfig(mixing=0.6, back_emf=1.0),
-            leveling=LevelingConfig(form="residual"),
+            leveling=LevelingConfig(form="residual", gains=AttitudeGains(tilt=500.0, tilt_rate=20.0)),
         )
     raise UnknownNameError("controller", name, CONTROLLERS)
 

@@ -65,8 +65,9 @@ class Compensator:
         self._source: Source = make_source(config, self._dynamics)
         self._guard = Guard(config.limits)
         gains = config.gains
-        self._tilt_gain = np.array([gains.tilt, gains.tilt, gains.heading])
-        self._rate_gain = np.array([gains.tilt_rate, gains.tilt_rate, gains.heading_rate])
+        tilt, tilt_rate = gains.in_force(config.mix)
+        self._tilt_gain = np.array([tilt, tilt, gains.heading])
+        self._rate_gain = np.array([tilt_rate, tilt_rate, gains.heading_rate])
         self.reset()
 
     @property

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.leveling.narx import NarxConfig
 from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
@@ -12,20 +14,40 @@ from bluefoot_mpc.settings import require_nonnegative, require_positive, require
 Source = Literal["zero", "network", "persistence", "model"]
 """Where the disturbance ψ comes from: nowhere, the NARX network, the last measured one, or Pinocchio."""
 
+TUNED = ((0.125, 16000.0, 80.0), (0.25, 10500.0, 60.0), (0.35, 8000.0, 60.0))
+"""Share α of the levelling goals, K_b (1/s²), K_d (1/s): as high as they go before legs of a slow trot ring.
+
+Searched on randomised robots with ``benchmarks/tune_leveling.py`` and by hand, for goals that are mixed.
+"""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class AttitudeGains:
-    """Angular acceleration that the compensator wants against tilt: K_b θ + K_d dθ/dt."""
+    """Angular acceleration that the compensator wants against tilt: K_b θ + K_d dθ/dt.
 
-    tilt: float = 9000.0  # K_b of roll and pitch, 1/s²
-    tilt_rate: float = 100.0  # K_d of roll and pitch, 1/s
+    Gains left at ``None`` are those of `TUNED` at the share α in force.
+    """
+
+    tilt: float | None = None  # K_b of roll and pitch, 1/s²
+    tilt_rate: float | None = None  # K_d of roll and pitch, 1/s
     heading: float = 0.0  # K_b of the error to the commanded heading, 1/s²
     heading_rate: float = 0.0  # K_d of it, 1/s
 
     def __post_init__(self) -> None:
         """Check signs."""
-        require_nonnegative(
-            tilt=self.tilt, tilt_rate=self.tilt_rate, heading=self.heading, heading_rate=self.heading_rate
+        require_nonnegative(heading=self.heading, heading_rate=self.heading_rate)
+        for name in ("tilt", "tilt_rate"):
+            value = getattr(self, name)
+            if value is not None:
+                require_nonnegative(**{name: value})
+
+    def in_force(self, mix: float) -> tuple[float, float]:
+        """K_b (1/s²) and K_d (1/s) of roll and pitch for the share α = `mix`."""
+        shares, *columns = zip(*TUNED, strict=True)
+        tilt, tilt_rate = (float(np.interp(mix, shares, column)) for column in columns)
+        return (
+            tilt if self.tilt is None else self.tilt,
+            tilt_rate if self.tilt_rate is None else self.tilt_rate,
         )
 
 

@@ -13,16 +13,16 @@ OUTPUTS = 22
 INPUTS = 2 * OUTPUTS + 3 * N_LEGS
 """z1, z2 and f_ext."""
 
-_POSITION, _ANGLE, _JOINT = 0.02, 0.1, 0.5  # m, rad, rad
-_SPEED, _RATE, _JOINT_RATE = 0.2, 1.0, 3.0  # m/s, rad/s, rad/s
-_FORCE = 10.0  # N
+_POSITION, _ANGLE, _JOINT = 0.01, 0.05, 0.25  # m, rad, rad
+_SPEED, _RATE, _JOINT_RATE = 0.1, 0.5, 1.5  # m/s, rad/s, rad/s
+_FORCE = 5.0  # N
 
 INPUT_SCALE: FloatArray = np.array(
     [_POSITION] * 3 + [_ANGLE] * 3 + [_JOINT] * N_JOINTS
     + [_SPEED] * 3 + [_RATE] * 3 + [_JOINT_RATE] * N_JOINTS + [_FORCE] * (3 * N_LEGS)
 )  # fmt: skip
 """(56,) sizes that count as one: what these quantities reach in a trot."""
-OUTPUT_SCALE: FloatArray = np.array([10.0] * 3 + [1.0] * 3 + [0.5] * N_JOINTS)
+OUTPUT_SCALE: FloatArray = np.array([5.0] * 3 + [0.5] * 3 + [0.25] * N_JOINTS)
 """(22,) N, N·m, N·m: the same of ψ."""
 
 
@@ -68,7 +68,7 @@ def newest_rate(imu: ImuBatch, mean: FloatArray) -> FloatArray:
     if not len(usable):
         return mean
     newest: FloatArray = usable[-1] - usable.sum(axis=0) / len(usable) + mean
-    return newest
+    return newest if np.isfinite(newest).all() else mean
 
 
 def velocity(inputs: LevelingInputs) -> FloatArray:
