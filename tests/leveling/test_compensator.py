@@ -283,10 +283,11 @@ def test_goals_that_stay_at_their_limit_stop_it_for_good(monkeypatch):
     assert law.step(INPUTS, DT).report.share == 1.0
 
 
-def test_a_source_without_an_answer_is_not_acted_on(monkeypatch):
+@pytest.mark.parametrize("answer", [None, np.full(22, np.nan), np.full(22, np.inf)])
+def test_a_source_without_an_answer_is_not_acted_on(monkeypatch, answer):
     law, source = told(monkeypatch, PSI)
     assert last(law, INPUTS).report.share == 1.0
-    source.psi = None
+    source.psi = answer
     leveled = law.step(INPUTS, DT)
     assert leveled.report.share == 0.0
     assert leveled.report.stopped == "nothing predicts the disturbance"

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.leveling.config import AttitudeGains, LevelingConfig, LevelingLimits, ScheduleConfig
+from bluefoot_mpc.leveling.config import TUNED, AttitudeGains, LevelingConfig, LevelingLimits, ScheduleConfig
 from bluefoot_mpc.settings import build, to_table
 
 
@@ -31,6 +31,21 @@ def test_a_delay_outside_of_its_range_is_refused(ticks):
 def test_gains_must_be_numbers_that_are_not_negative(name, value):
     with pytest.raises(ConfigurationError, match=name):
         AttitudeGains(**{name: value})
+
+
+def test_gains_that_nobody_sets_are_those_tuned_for_the_share():
+    rows = sorted(TUNED)
+    for mix, tilt, tilt_rate in rows:
+        assert AttitudeGains().in_force(mix) == (tilt, tilt_rate)
+    (low, first, _), (high, second, _) = rows[:2]
+    assert AttitudeGains().in_force(0.5 * (low + high))[0] == pytest.approx(0.5 * (first + second))
+    assert AttitudeGains().in_force(1e-6) == rows[0][1:]
+    assert AttitudeGains().in_force(0.9) == rows[-1][1:]
+
+
+def test_gains_that_somebody_sets_are_in_force_at_every_share():
+    assert AttitudeGains(tilt=0.0, tilt_rate=7.0).in_force(0.25) == (0.0, 7.0)
+    assert AttitudeGains(tilt=5.0).in_force(0.25) == (5.0, AttitudeGains().in_force(0.25)[1])
 
 
 @pytest.mark.parametrize("name", ["start", "off", "on", "learn_time"])

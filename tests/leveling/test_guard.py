@@ -93,3 +93,15 @@ def test_a_fault_stops_it_until_reset(guard):
     assert guard.stopped == ""
     well(guard, DT)
     assert guard.stopped == ""
+
+
+def test_a_pause_ends_a_row_of_clamped_ticks(guard):
+    for _ in range(5):
+        guard.cut(np.full(16, 1.0), DT)
+    guard.watch(0.0, "", "dark", DT)
+    well(guard, 2 * PAUSE)
+    for _ in range(5):
+        guard.cut(np.full(16, 1.0), DT)
+    assert guard.stopped == ""
+    guard.cut(np.full(16, 1.0), DT)
+    assert guard.stopped != ""
