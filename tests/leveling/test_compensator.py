@@ -228,6 +228,27 @@ def test_without_walking_the_goals_are_those_of_the_gait(psi):
         assert leveled.report.share == 0.0
 
 
+@pytest.mark.parametrize(
+    ("learn", "walking", "acting", "training"),
+    [
+        ("off", True, False, True), ("off", True, True, False), ("off", False, False, False),
+        ("always", True, True, True), ("always", True, False, True), ("always", False, False, False),
+        ("never", True, False, False), ("never", True, True, False),
+    ],
+)  # fmt: skip
+def test_the_network_learns_of_a_walk_in_the_windows_it_may(learn, walking, acting, training):
+    schedule = ScheduleConfig(fade=0.02, learn_time=0.0, learn=learn, off=0.0 if acting else 100.0)
+    law = compensator(psi="network", schedule=schedule)
+    source = law.source
+    source._narx._power = 1e9  # not to be doubted
+    last(law, replace(INPUTS, walking=walking), 4)
+    before = source.weights.layers[2]
+    report = law.step(replace(INPUTS, walking=walking), DT).report
+    assert (report.share > 0.0) == acting
+    assert report.training == training
+    assert np.any(source.weights.layers[2] != before) == training
+
+
 # The measured target, seen from outside.
 
 
@@ -296,6 +317,22 @@ def test_a_source_without_an_answer_is_not_acted_on(monkeypatch, answer):
     shares = [law.step(INPUTS, DT).report.share for _ in range(60)]
     assert shares[40] == 0.0
     assert shares[-1] == 1.0
+
+
+@pytest.mark.parametrize("what", ["unhealthy", "tilt", "answer"])
+def test_what_cannot_be_acted_on_is_not_faded_out(monkeypatch, what):
+    law, source = told(monkeypatch, PSI, schedule=ScheduleConfig(fade=0.2))
+    assert last(law, INPUTS, 20).report.share == 1.0
+    source.psi = None if what == "answer" else PSI
+    leveled = law.step(BROKEN[what](INPUTS) if what in BROKEN else INPUTS, DT)
+    assert leveled.report.share == 0.0
+    np.testing.assert_array_equal(leveled.goals, INPUTS.goals)
+
+
+def test_a_large_tilt_is_faded_out(monkeypatch):
+    law, _ = told(monkeypatch, PSI, schedule=ScheduleConfig(fade=0.2))
+    last(law, INPUTS, 20)
+    assert law.step(seen(state(rpy=(0.4, 0.0, 0.0))), DT).report.share == pytest.approx(0.9)
 
 
 def test_a_fault_of_the_source_stops_it_until_reset(monkeypatch):
