@@ -105,3 +105,12 @@ def last(law: Compensator, inputs: LevelingInputs, ticks: int = 3) -> Leveled:
     for _ in range(ticks):
         leveled = law.step(inputs, DT)
     return leveled
+
+
+PSI: FloatArray = np.random.default_rng(3).normal(0.0, 1.0, 22) * np.repeat([5.0, 0.5, 0.2], [3, 3, 16])
+MOVED = state(
+    rpy=(0.03, -0.05, 0.4), rate=(0.2, -0.3, 0.1), velocity=(0.1, 0.02, -0.03),
+    joints=STANCE + np.linspace(-0.1, 0.12, 16), speed=np.linspace(-1.0, 2.0, 16),
+)  # fmt: skip
+INPUTS = seen(MOVED, heading_error=-0.08, tilt_reference=np.array([0.01, 0.02]))
+"""A robot in motion, tilted and off its course."""
