@@ -39,6 +39,7 @@ class Told:
         seen: the situations that it was shown.
     """
 
+    trust = 1.0
     mse = rate = math.nan
     ready = True
     fault = doubt = ""
