@@ -44,7 +44,7 @@ def preset(name: str, robot: RobotParameters | None = None) -> ControlConfig:
             ground=GroundAdaptationConfig(enabled=True),
             whole_body=BodyPlannerConfig(enabled=True),
             servo=ServoMapConfig(mixing=0.6, back_emf=1.0),
-            leveling=LevelingConfig(form="residual", gains=AttitudeGains(tilt=500.0, tilt_rate=20.0)),
+            leveling=LevelingConfig(form="residual", gains=AttitudeGains(tilt=200.0, tilt_rate=10.0)),
         )
     raise UnknownNameError("controller", name, CONTROLLERS)
 

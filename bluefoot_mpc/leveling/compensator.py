@@ -187,15 +187,15 @@ class Compensator:
         """(16,) N·m, levelling torque τ̂ = -[Γ1 M̂⁻¹ Γ2]† [Γ1 M̂⁻¹ ψ̂ + K_b θ + K_d dθ/dt]."""
         config, estimate = self._config, inputs.estimate
         unwanted = psi
-        if config.attitude:
-            roll, pitch = (estimate.rpy[:2] - inputs.tilt_reference).tolist()
-            tilt = np.array([roll, pitch, inputs.heading_error])
-            unwanted = unwanted + self._tilt_gain * tilt + self._rate_gain * inputs.turn_rate
         if config.form == "residual" and config.psi != "zero":
             # The controller's goals make torque already: what they do about ψ is not to be done twice.
             ahead = inputs.goals - estimate.joint_position
             torque = self._servo.stiffness * ahead - self._servo.back_emf * estimate.joint_velocity
-            unwanted = unwanted + dynamics.from_torque @ torque
+            unwanted = self._source.trust * (unwanted + dynamics.from_torque @ torque)
+        if config.attitude:
+            roll, pitch = (estimate.rpy[:2] - inputs.tilt_reference).tolist()
+            tilt = np.array([roll, pitch, inputs.heading_error])
+            unwanted = unwanted + self._tilt_gain * tilt + self._rate_gain * inputs.turn_rate
         return -(dynamics.to_torque @ unwanted)
 
     def _mixed(self, inputs: LevelingInputs, torque: FloatArray, dt: float) -> FloatArray:

@@ -44,6 +44,7 @@ class Source(Protocol):
     """Predicts ψ of the coming period.
 
     Attributes:
+        trust: share of what is predicted that is acted upon on top of a controller, 0..1.
         mse: low-passed squared error, NaN where nothing learns.
         rate: learning rate, NaN where nothing learns.
         ready: False while a prediction is not to be used yet.
@@ -51,6 +52,7 @@ class Source(Protocol):
         doubt: why they are not to be used for now; empty while they can.
     """
 
+    trust: float
     mse: float
     rate: float
     ready: bool
@@ -71,6 +73,7 @@ class Source(Protocol):
 class _Plain:
     """What sources without a network have in common."""
 
+    trust = 1.0
     mse = math.nan
     rate = math.nan
     ready = True
@@ -122,6 +125,7 @@ class Network:
     """The NARX network: learns ψ while it may, predicts it always.
 
     Attributes:
+        trust: share of the disturbance's power that it explains of late.
         mse: low-passed squared error, scaled units.
         rate: learning rate.
         ready: True with loaded weights, or once it has learnt for long enough.
@@ -165,6 +169,8 @@ class Network:
 
     def _note(self) -> None:
         self.mse, self.rate = self._narx.mse, self._narx.rate
+        power = self._narx.power
+        self.trust = min(1.0, max(0.0, 1.0 - self.mse / power)) if power > 0.0 else 0.0
         self.ready = self._weights is not None or self._learnt >= self._learn_time - 1e-9
         self.fault = "the network has diverged" if self._narx.diverged else ""
         useless = self.ready and self._narx.mse > self._narx.power
