@@ -72,11 +72,11 @@ def test_softer_servos_alone_do_not_level_it(axis):
     assert -10.0 < figures("mixing")["reduction_percent"][axis] < 20.0
 
 
-# Measured: from 0.08° to at most 0.12°. A bound against harm, not the figure that is to be reached.
+# Measured: 0.11° of tilt without, and within 0.02° of it with. A bound against harm, not the figure that is to be reached.
 @pytest.mark.parametrize("part", ON_TOP)
 def test_on_top_of_model_based_control_it_does_no_harm(part):
     found = figures(part, "mpc")
-    assert found["on"]["tilt_rms_deg"] < found["off"]["tilt_rms_deg"] + 0.1
+    assert found["on"]["tilt_rms_deg"] < found["off"]["tilt_rms_deg"] + 0.03
 
 
 # When it acts.
