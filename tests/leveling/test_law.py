@@ -188,6 +188,17 @@ def test_a_residual_does_not_repeat_what_the_goals_do_already(monkeypatch):
     np.testing.assert_allclose(turned(mass_of(MOVED), torque + made, PSI), 0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize("trust", [0.0, 0.4])
+def test_a_residual_acts_on_the_share_of_a_prediction_that_is_trusted(monkeypatch, trust):
+    law, source = told(monkeypatch, PSI, form="residual", gains=GAINS, limits=WIDE, mass_matrix="model")
+    source.trust = trust
+    torque = law.step(INPUTS, DT).report.torque
+    made = SERVO.stiffness * (INPUTS.goals - MOVED.joint_position) - SERVO.back_emf * MOVED.joint_velocity
+    mass = mass_of(MOVED)
+    expected = -UNWANTED - trust * turned(mass, made, PSI)
+    np.testing.assert_allclose(turned(mass, torque, np.zeros(22)), expected, rtol=1e-9, atol=1e-9)
+
+
 def test_a_low_battery_takes_further_goals_for_the_same_torque():
     full = compensator(psi="zero", gains=GAINS, limits=WIDE, form="residual").step(INPUTS, DT)
     low = compensator(psi="zero", gains=GAINS, limits=WIDE, form="residual")

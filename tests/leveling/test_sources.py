@@ -149,6 +149,21 @@ def test_a_network_that_is_worse_than_nothing_is_doubted_until_it_is_not():
     assert doubts[-1] == ""
 
 
+def test_a_network_is_trusted_as_far_as_it_explains_the_disturbance():
+    made = network(narx=NarxConfig(weight_scale=2.0))
+    assert made.trust == 0.0
+    seen = []
+    made.step(SITUATION, DT)
+    for _ in range(600):
+        made.step(replace(SITUATION, target=0.2 * TARGET), DT)
+        seen.append(made.trust)
+        assert made.trust == pytest.approx(max(0.0, 1.0 - made.mse / made._narx.power))
+    assert seen[20] == 0.0
+    assert seen[-1] > 0.9
+    made.reset()
+    assert made.trust == 0.0
+
+
 def test_weights_that_were_saved_are_used_at_once_and_after_reset(tmp_path):
     taught = network()
     for _ in range(200):
