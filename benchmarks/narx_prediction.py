@@ -182,9 +182,9 @@ def medians(tables):
 
 
 def show(title, rows, columns):
-    print(f"\n{title}\n{'':36s}" + "".join(f"{column:>10s}" for column in columns))
+    print(f"\n{title}\n{'':44s}" + "".join(f"{column:>10s}" for column in columns))
     for name, row in rows.items():
-        print(f"{name:36s}" + "".join(f"{row.get(column, float('nan')):10.3f}" for column in columns))
+        print(f"{name:44s}" + "".join(f"{row.get(column, float('nan')):10.3f}" for column in columns))
 
 
 def main() -> None:
