@@ -20,6 +20,7 @@ class LevelPart:
         name: as tables and options call it.
         attitude: whether tilt and its rate are fed back.
         psi: where the disturbance comes from.
+        learn: when a network learns, as the paper's experiment has it unless given.
         controllers: those under which it is measured.
         meaning: one line for people.
     """
@@ -27,6 +28,7 @@ class LevelPart:
     name: str
     attitude: bool
     psi: str
+    learn: str = "off"
     controllers: tuple[str, ...] = ("cpg", "mpc")
     meaning: str
 
@@ -36,7 +38,10 @@ class LevelPart:
         Args:
             controller: under which it runs.
         """
-        chosen = f"control.leveling.attitude={str(self.attitude).lower()}", f"control.leveling.psi={self.psi}"
+        chosen = (
+            f"control.leveling.attitude={str(self.attitude).lower()}", f"control.leveling.psi={self.psi}",
+            f"control.leveling.schedule.learn={self.learn}",
+        )  # fmt: skip
         return (*chosen, *TUNED.get(controller, {}).get(self.name, ()))
 
 
@@ -50,6 +55,10 @@ LEVEL_PARTS = (
     ),
     LevelPart(name=FEEDBACK, attitude=True, psi="zero", meaning="attitude feedback"),
     LevelPart(name=NETWORK, attitude=True, psi="network", meaning="attitude feedback and the network"),
+    LevelPart(
+        name="always", attitude=True, psi="network", learn="always",
+        meaning="the same, with a network that goes on learning while it acts",
+    ),
     LevelPart(
         name="network", attitude=False, psi="network", controllers=("cpg",),
         meaning="the network without attitude feedback",

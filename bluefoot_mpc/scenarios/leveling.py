@@ -67,6 +67,7 @@ class Level(Walk):
             "leveling": leveling,
             "zmp": {"enabled": False},
             "posture": {"level_gain": 0.0},
+            "tracking": {"wait_for_ramp": True},
             "gait": {"reflex": {"enabled": False}, "trot": UNCOMPENSATED_TROT},
         }
 

@@ -107,10 +107,10 @@ def simulate(name_or_path: str, options: RunOptions) -> RunResult:
         ConfigurationError: an option, file or value is impossible.
     """
     resolved = resolve(find_scenario(name_or_path), options)
-    model, simulator, table = _prepare(resolved)
-    hooks = LoopHooks(truth=simulator.truth)
-    data, _ = _drive(simulator, model, resolved, resolved.scenario.source, hooks, table)
-    return _judge(data, resolved, model, Path())
+    made = _prepare(resolved)
+    hooks = LoopHooks(truth=made.simulator.truth)
+    data = _drive(made.simulator, made, resolved, resolved.scenario.source, hooks)
+    return _judge(data, resolved, made.model, Path())
 
 
 def run_commanded(
@@ -132,32 +132,53 @@ def run_commanded(
         LogError: the log cannot be written.
     """
     presentation = presentation or Presentation()
-    model, simulator, table = _prepare(resolved)
+    made = _prepare(resolved)
+    simulator = made.simulator
     folder = _make_folder(options, resolved.run.scenario)
     with _writing(folder / CONFIG):
-        (folder / CONFIG).write_text(dump_toml(table), encoding="utf-8")
+        (folder / CONFIG).write_text(dump_toml(made.table), encoding="utf-8")
     with _log_in(folder):
-        with _observers(model, resolved, options, presentation) as observers:
+        with _observers(made.model, resolved, options, presentation) as observers:
             paced = options.view if presentation.paced is None else presentation.paced
             robot = PacedRobot(simulator) if paced else simulator
-            with Recorder(folder / LOG, table, simulator.period) as recorder:
+            with Recorder(folder / LOG, made.table, simulator.period) as recorder:
                 hooks = LoopHooks(recorder=recorder, truth=simulator.truth, observers=observers)
-                data, pipeline = _drive(robot, model, resolved, source, hooks, table)
+                data = _drive(robot, made, resolved, source, hooks)
                 recorder.finish(data.stop_reason, data.real_time_factor)
-        result = _judge(data, resolved, model, folder)
-        _write_results(result, model, options.report)
-        if pipeline.learnt is not None:
-            with _writing(folder / WEIGHTS):
-                save_weights(folder / WEIGHTS, pipeline.learnt)
+        result = _judge(data, resolved, made.model, folder)
+        _write_results(result, made.model, options.report)
+        _write_weights(made.pipeline, folder / WEIGHTS)
     return result
 
 
-def _prepare(resolved: Resolved) -> tuple[RobotModel, SimRobot, dict[str, Any]]:
-    """The robot's model, the simulated robot, and everything resolved with what the seed drew."""
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _Made:
+    """What a run needs, made before anything of an earlier run is touched.
+
+    Attributes:
+        model: the robot's model.
+        simulator: the simulated robot.
+        pipeline: the controller.
+        table: everything resolved, with what the seed drew.
+    """
+
+    model: RobotModel
+    simulator: SimRobot
+    pipeline: Pipeline
+    table: dict[str, Any]
+
+
+def _prepare(resolved: Resolved) -> _Made:
     model = RobotModel(resolved.parameters)
     resolved.scenario.check(model, resolved.stages.control)
     simulator = SimRobot(model, resolved.stages.sim, resolved.run.seed)
-    return model, simulator, {**resolved.table(), "drawn": simulator.drawn}
+    try:
+        pipeline = Pipeline(model, resolved.stages.control, simulator.period)
+    except BaseException:
+        simulator.close()
+        raise
+    table = {**resolved.table(), "drawn": simulator.drawn}
+    return _Made(model=model, simulator=simulator, pipeline=pipeline, table=table)
 
 
 @contextmanager
@@ -188,6 +209,13 @@ def _write_results(result: RunResult, model: RobotModel, report: bool) -> None:
         write_report(result.data, result.summary, model, result.folder / REPORT, checks)
 
 
+def _write_weights(pipeline: Pipeline, file: Path) -> None:
+    """Keep what the levelling network has learnt, where one ran."""
+    if pipeline.learnt is not None:
+        with _writing(file):
+            save_weights(file, pipeline.learnt)
+
+
 @contextmanager
 def _writing(file: Path) -> Iterator[None]:
     """Turn what hinders writing a file into one message; half a file is not left behind."""
@@ -214,17 +242,15 @@ def _log_in(folder: Path) -> Iterator[None]:
 
 def _drive(
     robot: Robot,
-    model: RobotModel,
+    made: _Made,
     resolved: Resolved,
     source: CommandSource,
     hooks: LoopHooks,
-    table: dict[str, Any],
-) -> tuple[RunData, Pipeline]:
-    """The loop itself, and the controller as it left it; the robot is closed whatever happens."""
+) -> RunData:
+    """The loop itself; the robot is closed whatever happens."""
     try:
-        supervised = supervise(robot, model, resolved)
-        pipeline = Pipeline(model, resolved.stages.control, robot.period)
-        return run_loop(supervised, pipeline, source, hooks, table), pipeline
+        supervised = supervise(robot, made.model, resolved)
+        return run_loop(supervised, made.pipeline, source, hooks, made.table)
     finally:
         robot.close()
 

@@ -169,7 +169,7 @@ def test_the_parts_of_levelling_are_one_command(capfd, tmp_path, level_runs):
     assert {"level-roll", "level-pitch", "level-credit", "level", "limits"} <= set(page.ids)
     assert "ablation" not in page.ids
     bars = json.loads(page.texts["figures"])["level-roll"]["data"]
-    assert [bar["name"] for bar in bars] == ["mix", "pd", "narx", "network", "persistence", "model"]
+    assert [bar["name"] for bar in bars] == ["mix", "pd", "narx", "always", "network", "persistence", "model"]
     assert bars[1]["y"] == [50.0, 50.0]
 
 

@@ -72,7 +72,7 @@ def test_softer_servos_alone_do_not_level_it(axis):
     assert -10.0 < figures("mixing")["reduction_percent"][axis] < 20.0
 
 
-# Measured: 0.11° of tilt without, and within 0.02° of it with. A bound against harm, not the figure that is to be reached.
+# Measured: 0.11° of tilt without, and within 0.02° of it with: a bound against harm, not the figure to reach.
 @pytest.mark.parametrize("part", ON_TOP)
 def test_on_top_of_model_based_control_it_does_no_harm(part):
     found = figures(part, "mpc")

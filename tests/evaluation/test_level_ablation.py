@@ -24,7 +24,7 @@ from bluefoot_mpc.scenarios import RunOptions
 from bluefoot_mpc.scenarios.config import resolve
 from bluefoot_mpc.scenarios.registry import find_scenario
 
-TILTS = {"mix": 3.8, "pd": 2.0, "narx": 1.6, "network": 3.7, "persistence": 1.9, "model": 2.1}
+TILTS = {"mix": 3.8, "pd": 2.0, "narx": 1.6, "always": 1.7, "network": 3.7, "persistence": 1.9, "model": 2.1}
 """Tilt (degrees) that each part leaves of four."""
 
 
@@ -40,7 +40,7 @@ def ran(monkeypatch, tilts):
     def measured(case, seed):
         seen.append((case, seed))
         overrides = case.options["overrides"]
-        (part,) = [p.name for p in LEVEL_PARTS if set(p.overrides("cpg")[:2]) <= set(overrides)]
+        (part,) = [p.name for p in LEVEL_PARTS if set(p.overrides("cpg")[:3]) <= set(overrides)]
         on = tilts[part] * (1.0 + 0.01 * seed)
         figures = dict.fromkeys(SHOWN, 0.0)
         lower = 100.0 * (1.0 - on / 4.0)
@@ -74,7 +74,7 @@ def test_every_part_meets_the_same_seeds_and_the_two_rivals_of_the_network(ran):
 
 def test_rows_that_mean_nothing_under_model_based_control_are_not_run(ran):
     rows = ablated("level-mpc-60")
-    assert [row.part.name for row in rows] == ["pd", "narx", "persistence", "model"]
+    assert [row.part.name for row in rows] == ["pd", "narx", "always", "persistence", "model"]
     assert {case.options["controller"] for case, _ in ran} == {"mpc"}
 
 
