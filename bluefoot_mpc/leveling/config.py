@@ -14,7 +14,7 @@ from bluefoot_mpc.settings import require_nonnegative, require_positive, require
 Source = Literal["zero", "network", "persistence", "model"]
 """Where the disturbance ψ comes from: nowhere, the NARX network, the last measured one, or Pinocchio."""
 
-TUNED = ((0.125, 16000.0, 80.0), (0.25, 10500.0, 60.0), (0.35, 8000.0, 60.0))
+TUNED = ((0.125, 16000.0, 80.0), (0.25, 11000.0, 160.0), (0.35, 8000.0, 60.0))
 """Share α of the levelling goals, K_b (1/s²), K_d (1/s): as high as they go before legs of a slow trot ring.
 
 Searched on randomised robots with ``benchmarks/tune_leveling.py`` and by hand, for goals that are mixed.
