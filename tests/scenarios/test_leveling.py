@@ -195,7 +195,7 @@ def percent(value):
     ("changes", "name"),
     [
         ({"fell": True}, "stays on its feet"),
-        ({"speed_change_percent": -3.1}, "no slower"),
+        ({"speed_change_percent": -1.1}, "no slower"),
         ({"speed_change_percent": None}, "no slower"),
         ({"height_change_m": -0.0051}, "mm lower"),
         ({"stopped": ["NaN"]}, "disengage"),
