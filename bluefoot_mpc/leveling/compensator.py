@@ -188,7 +188,8 @@ class Compensator:
         config, estimate = self._config, inputs.estimate
         unwanted = psi
         if config.form == "residual" and config.psi != "zero":
-            # The controller's goals make torque already: what they do about ψ is not to be done twice.
+            # What the controller's goals do about ψ is not to be done twice. The torque that was measured
+            # would be the consistent one; this share, which comes sooner and softens, levels better.
             ahead = inputs.goals - estimate.joint_position
             torque = self._servo.stiffness * ahead - self._servo.back_emf * estimate.joint_velocity
             unwanted = self._source.trust * (unwanted + dynamics.from_torque @ torque)
