@@ -8,6 +8,11 @@ from typing import Literal
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
 
+MOST_NEURONS = 1000
+"""Of one hidden layer: two of these take some 3 ms a tick on one core, sixty times the default."""
+MOST_DELAYS = 100
+"""Samples of a delay line: two seconds at the 50 Hz of the servos."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class NarxConfig:
@@ -34,8 +39,8 @@ class NarxConfig:
         if len(self.hidden) != 2:
             raise ConfigurationError(f"hidden = {self.hidden!r} must name the sizes of two layers")
         for index, count in enumerate(self.hidden):
-            _require_count(f"hidden[{index}]", count)
-        _require_count("delays", self.delays)
+            _require_count(f"hidden[{index}]", count, MOST_NEURONS)
+        _require_count("delays", self.delays, MOST_DELAYS)
         if self.seed < 0:
             raise ConfigurationError(f"seed = {self.seed!r} must not be negative")
         require_positive(
@@ -96,6 +101,6 @@ def low_pass(mse: float, square: float, weight: float) -> float:
     return weight * square + (1.0 - weight) * mse
 
 
-def _require_count(name: str, count: int) -> None:
-    if count < 1:
-        raise ConfigurationError(f"{name} = {count!r} must be at least 1")
+def _require_count(name: str, count: int, most: int) -> None:
+    if not 1 <= count <= most:
+        raise ConfigurationError(f"{name} = {count!r} must be at least 1 and at most {most}")

@@ -130,23 +130,9 @@ class Narx:
         Raises:
             ConfigurationError: sizes, delays or scales are others than this network's, or weights too large.
         """
-        config = self.config
-        pairs = (
-            ("inputs", len(weights.input_scale), self._inputs.size),
-            ("outputs", len(weights.output_scale), self._targets.size),
-            ("delays", weights.delays, config.delays),
-            ("hidden", weights.hidden, tuple(config.hidden)),
-        )
-        for name, found, wanted in pairs:
-            if found != wanted:
-                raise ConfigurationError(
-                    f"weights are for {name} = {found}, the network has {wanted}; "
-                    f"configure it alike or train anew"
-                )
-        _check_same("input_scale", weights.input_scale, self._inputs.scale)
-        _check_same("output_scale", weights.output_scale, self._targets.scale)
+        self._check_fit(weights)
         flat = np.concatenate([layer.ravel() for layer in weights.layers])
-        _check_norm("weights", flat, config, "train anew")
+        _check_norm("weights", flat, self.config, "train anew")
         self._use(flat)
 
     def predict(self, inputs: FloatArray) -> Prediction:
@@ -199,9 +185,21 @@ class Narx:
             self._descend()
         return NarxStatus.DIVERGED if self._diverged else NarxStatus.OK
 
-    def observe(self, target: FloatArray) -> NarxStatus:
-        """Follow the error without learning; as `train` with ``learn=False``."""
-        return self.train(target, learn=False)
+    def _check_fit(self, weights: NarxWeights) -> None:
+        pairs = (
+            ("inputs", len(weights.input_scale), self._inputs.size),
+            ("outputs", len(weights.output_scale), self._targets.size),
+            ("delays", weights.delays, self.config.delays),
+            ("hidden", weights.hidden, tuple(self.config.hidden)),
+        )
+        for name, found, wanted in pairs:
+            if found != wanted:
+                raise ConfigurationError(
+                    f"weights are for {name} = {found}, the network has {wanted}; "
+                    f"configure it alike or train anew"
+                )
+        _check_same("input_scale", weights.input_scale, self._inputs.scale)
+        _check_same("output_scale", weights.output_scale, self._targets.scale)
 
     def _descend(self) -> None:
         config, perceptron = self.config, self._perceptron
@@ -274,7 +272,8 @@ def _check_same(name: str, found: FloatArray, wanted: FloatArray) -> None:
 
 
 def _check_norm(name: str, flat: FloatArray, config: NarxConfig, way_out: str) -> None:
-    norm = float(np.linalg.norm(flat))
+    with np.errstate(over="ignore"):  # infinite is what the message is to say
+        norm = float(np.linalg.norm(flat))
     if not norm < config.weight_bound:
         raise ConfigurationError(
             f"{name} of norm {norm:g} count as diverged, wanted is less than "

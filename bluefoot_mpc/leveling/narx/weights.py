@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
+import tokenize
 import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -19,6 +21,21 @@ VERSION = 1
 _LAYERS = ("layer_1", "layer_2", "layer_3")
 _KEYS = ("version", "delays", "input_scale", "output_scale", *_LAYERS)
 _ANEW = "train a network anew and save it with this version"
+_ZIP, _ARRAY = b"PK", b"\x93NUMPY"  # how an archive of arrays begins, and a file of one array
+# What numpy and zipfile raise on bytes that are no archive of arrays. SyntaxError and TokenError come from
+# the text that describes an array, MemoryError from a giant shape, RuntimeError from an encrypted member.
+_DAMAGE = (
+    ValueError,
+    TypeError,
+    EOFError,
+    KeyError,
+    RuntimeError,
+    SyntaxError,
+    MemoryError,
+    tokenize.TokenError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -158,19 +175,48 @@ def load_weights(path: Path) -> NarxWeights:
 
 
 def _read(path: Path) -> dict[str, FloatArray]:
-    """Every array of the file."""
+    """The arrays of the file that are known by name."""
     try:
         with path.open("rb") as stream:
-            archive = np.load(stream, allow_pickle=False)
-            if isinstance(archive, np.ndarray):
-                raise ConfigurationError(f"{path} holds one array, not weights of a network; {_ANEW}")
-            with archive:
-                return {key: archive[key] for key in archive.files}
+            _check_kind(path, stream)
+            return _read_archive(path, stream)
     except OSError as error:
         raise ConfigurationError(
             f"cannot read weights from {path}: {error.strerror or error}; name a file that was saved"
         ) from error
-    except (ValueError, EOFError, KeyError, NotImplementedError, zipfile.BadZipFile, zlib.error) as error:
+
+
+def _check_kind(path: Path, stream: BinaryIO) -> None:
+    """See by its first bytes what the file is: numpy would take any other for pickled objects."""
+    start = stream.read(len(_ARRAY))
+    stream.seek(0)
+    if start == _ARRAY:
+        raise ConfigurationError(f"{path} holds one array, not weights of a network; {_ANEW}")
+    if not start.startswith(_ZIP):
         raise ConfigurationError(
-            f"{path} is damaged or no file of weights ({error}); copy it again, or {_ANEW}"
+            f"{path} is damaged or no file of weights: it does not begin as an .npz file does; "
+            f"name a file that was saved, copy it again, or {_ANEW}"
+        )
+
+
+def _read_archive(path: Path, stream: BinaryIO) -> dict[str, FloatArray]:
+    values: dict[str, FloatArray] = {}
+    part = "its list of arrays"
+    try:
+        with np.load(stream, allow_pickle=False) as archive:
+            for key in _KEYS:
+                if key in archive.files:
+                    part = key
+                    values[key] = _array(archive[key])
+    except _DAMAGE as error:
+        raise ConfigurationError(
+            f"{path} is damaged or no file of weights: {part} cannot be read; copy it again, or {_ANEW}"
         ) from error
+    return values
+
+
+def _array(member: object) -> FloatArray:
+    """A member of the archive, which numpy hands on as plain bytes where it is no array."""
+    if not isinstance(member, np.ndarray):
+        raise ValueError("no array")
+    return member

@@ -1,12 +1,13 @@
 import dataclasses
 import tomllib
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.leveling.narx import NarxConfig
+from bluefoot_mpc.leveling.narx import Narx, NarxConfig
 from bluefoot_mpc.leveling.narx.config import bold_driver, low_pass
 from bluefoot_mpc.settings import build, dump_toml, to_table
 
@@ -33,7 +34,11 @@ def test_the_papers_numbers_are_the_default():
         ({"rate_min": 0.0}, ("rate_min", "positive")),
         ({"hidden": (50, 0)}, ("hidden[1]", "at least 1")),
         ({"hidden": (50,)}, ("hidden", "two layers")),
+        ({"hidden": (200_000, 50)}, ("hidden[0] = 200000", "at most 1000")),
+        ({"hidden": (50, 1001)}, ("hidden[1] = 1001", "at most 1000")),
         ({"delays": 0}, ("delays", "at least 1")),
+        ({"delays": 101}, ("delays = 101", "at most 100")),
+        ({"delays": 99_999_999_999_999_999_999}, ("delays", "at most 100")),
         ({"beta": 1.0}, ("beta", "below 1")),
         ({"beta": -1e-4}, ("beta",)),
         ({"zeta": float("inf")}, ("zeta",)),
@@ -52,6 +57,11 @@ def test_impossible_values_are_named(values, words):
         NarxConfig(**values)
     for word in words:
         assert word in str(error.value)
+
+
+def test_the_largest_network_can_be_made():
+    network = Narx(NarxConfig(hidden=(1000, 1000), delays=100), np.ones(3), np.ones(2))
+    assert network.predict(np.ones(3)).valid
 
 
 def test_an_unknown_feedback_lists_the_valid_ones():
