@@ -95,7 +95,7 @@ def show(rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=5, help="times the walk is gone through")
-    parser.add_argument("--duration", type=float, default=24.0, help="s of the walk")
+    parser.add_argument("--duration", type=float, default=34.0, help="s of the walk")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
     arguments = parser.parse_args()
     rows = measure(arguments.rounds, arguments.duration)

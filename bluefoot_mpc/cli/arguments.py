@@ -104,7 +104,8 @@ class RunCommand(SimulationArguments):
         str | None,
         tyro.conf.arg(metavar="{none,pd,narx}", help_behavior_hint="(default: none; level: narx)"),
     ] = None
-    """Trunk levelling: none, attitude feedback, or with the disturbance that a network predicts."""
+    """Trunk levelling: none, attitude feedback, or with the disturbance that a network predicts
+    (options outrank --set)."""
     level_mix: Annotated[float | None, _Unset] = None
     """Trunk levelling: share of its goals in the goals, between 0 and 1 (0.25 unless given)."""
 

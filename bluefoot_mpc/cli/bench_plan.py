@@ -9,7 +9,7 @@ from bluefoot_mpc.cli.arguments import BenchCommand
 from bluefoot_mpc.evaluation import ablation
 from bluefoot_mpc.evaluation.cases import Case
 from bluefoot_mpc.evaluation.level_cases import DEFAULT_CASES, chosen_level_cases, level_cases
-from bluefoot_mpc.evaluation.level_parts import LEVEL_PARTS, LevelPart, level_parts
+from bluefoot_mpc.evaluation.level_parts import LEVEL_PARTS, LevelPart, level_parts, parts_of
 from bluefoot_mpc.evaluation.push_limit import PushSearch
 from bluefoot_mpc.evaluation.variants import VARIANTS, Variant, variants
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
@@ -54,7 +54,7 @@ def plan_of(command: BenchCommand) -> Plan:
     """What a command line asks for.
 
     Raises:
-        ConfigurationError: nothing is asked for, or a part without any of its cases.
+        ConfigurationError: nothing is asked for, a part without any of its cases, or a case without rows.
         UnknownNameError: a part, case or row does not exist.
     """
     parts = PARTS if command.full else names(command.parts)
@@ -66,14 +66,14 @@ def plan_of(command: BenchCommand) -> Plan:
     wanted = names(command.variants)
     _require_known("variant", wanted, [name for known in rows.values() for name in known])
     cases = _cases(command, parts)
+    level_rows = level_parts(tuple(name for name in wanted if name in rows.get("level", ())))
+    level = chosen_level_cases(cases.get("level", ()), seeds, command.duration if "level" in parts else None)
     return Plan(
         parts=parts,
         cases=ablation.chosen(cases.get("ablation", ()), seeds, command.duration),
         rows=variants(tuple(name for name in wanted if name in rows.get("ablation", ()))),
-        level_cases=chosen_level_cases(
-            cases.get("level", ()), seeds, command.duration if "level" in parts else None
-        ),
-        level_parts=level_parts(tuple(name for name in wanted if name in rows.get("level", ()))),
+        level_cases=_with_rows(level, level_rows, _names_cases(command)),
+        level_parts=level_rows,
         pushes=PushSearch(seeds=seeds),
         duration=command.duration or _TIMED_DURATION,
     )
@@ -98,7 +98,7 @@ def _cases(command: BenchCommand, parts: tuple[str, ...]) -> dict[str, tuple[str
     """Names of the cases of each part that has any."""
     known = {"ablation": tuple(ablation.bench_cases()), "level": tuple(level_cases())}
     known = {part: cases for part, cases in known.items() if part in parts}
-    if command.full or (command.cases is not None and names(command.cases) == (ALL,)):
+    if not _names_cases(command) and (command.full or command.cases is not None):
         return known
     if command.cases is None:
         own = {"ablation": ABLATION_CASES, "level": DEFAULT_CASES}
@@ -113,6 +113,23 @@ def _cases(command: BenchCommand, parts: tuple[str, ...]) -> dict[str, tuple[str
                 f"--cases names no case of {part}. Valid: {', '.join(known[part])}, {ALL}"
             )
     return found
+
+
+def _names_cases(command: BenchCommand) -> bool:
+    """True where somebody chose the cases one by one."""
+    return not command.full and command.cases is not None and names(command.cases) != (ALL,)
+
+
+def _with_rows(cases: dict[str, Case], rows: tuple[LevelPart, ...], named: bool) -> dict[str, Case]:
+    """The cases under whose controller a row is measured; one that was named has to be such a case."""
+    if named:
+        for name, case in cases.items():
+            parts_of(name, case, rows)
+    return {
+        name: case
+        for name, case in cases.items()
+        if any(case.options["controller"] in row.controllers for row in rows)
+    }
 
 
 def _require_known(kind: str, wanted: Iterable[str], known: Iterable[str]) -> None:

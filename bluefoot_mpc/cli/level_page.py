@@ -11,7 +11,7 @@ from rich.table import Table
 LEVEL_FIGURES = (
     "leveling", "windows", "off", "on", "reduction_percent", "peak_reduction_percent",
     "smooth_reduction_percent", "speed_change_percent", "height_change_m", "partial_windows",
-    "stopped_ticks", "stopped",
+    "partial_reasons", "stopped_ticks", "stopped",
 )  # fmt: skip
 """Figures of a run in windows that the table holds, instead of a line each."""
 _NONE = "–"

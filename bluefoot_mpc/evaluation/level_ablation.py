@@ -12,7 +12,7 @@ from bluefoot_mpc.evaluation.battery import Store, Verdict, run_battery
 from bluefoot_mpc.evaluation.cases import Case
 from bluefoot_mpc.evaluation.comparison import Comparison, compare
 from bluefoot_mpc.evaluation.level_measure import AXES, ON_WINDOWS
-from bluefoot_mpc.evaluation.level_parts import FEEDBACK, NETWORK, PERSISTENCE, LevelPart, with_part
+from bluefoot_mpc.evaluation.level_parts import FEEDBACK, NETWORK, PERSISTENCE, LevelPart, parts_of, with_part
 from bluefoot_mpc.evaluation.tables import limit_rows, spread
 
 COMPARED = tuple(f"on_{axis}_rms_deg" for axis in AXES)
@@ -87,6 +87,9 @@ def ablate_leveling(
         store: earlier results; new ones are added as they come.
         workers: processes; None takes one per core.
         progress: called after every run.
+
+    Raises:
+        ConfigurationError: a case is under a controller for which none of the parts is meant.
     """
     jobs = _jobs(cases, parts)
     found = run_battery([job for _, _, job in jobs], store, workers=workers, progress=progress)
@@ -107,7 +110,11 @@ def ablate_leveling(
 
 
 def missing_level_runs(cases: Mapping[str, Case], parts: Sequence[LevelPart], store: Store) -> int:
-    """Runs that are not in the store yet."""
+    """Runs that are not in the store yet.
+
+    Raises:
+        ConfigurationError: a case is under a controller for which none of the parts is meant.
+    """
     return sum(store.get(job, seed) is None for _, _, job in _jobs(cases, parts) for seed in job.seeds)
 
 
@@ -155,8 +162,7 @@ def _jobs(cases: Mapping[str, Case], parts: Sequence[LevelPart]) -> list[tuple[s
     return [
         (name, part, with_part(case, part))
         for name, case in cases.items()
-        for part in parts
-        if case.options["controller"] in part.controllers
+        for part in parts_of(name, case, parts)
     ]
 
 

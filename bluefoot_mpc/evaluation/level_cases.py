@@ -11,25 +11,26 @@ from bluefoot_mpc.evaluation.level_parts import NETWORK, level_parts, with_part
 from bluefoot_mpc.evaluation.limits import Limit
 from bluefoot_mpc.evaluation.model_cases import NO_FALL, PAYLOAD
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.scenarios.leveling import (
+    LEAST_DURATION,
+    LEAST_REDUCTION,
+    MOST_HARM,
+    MOST_SINKING,
+    SPEED_NOISE,
+)
 
 DEFAULT_CASES = ("level-60", "level-80", "level-100", "level-payload", "level-mpc-60-payload")
 """What runs where nobody chooses."""
-LEAST_DURATION = 24.0
-"""s: lead-in, one window without and one with levelling."""
 PAPER = ((0.06, 0.25), (0.06, 0.125), (0.06, 0.35), (0.08, 0.35), (0.10, 0.35))
 """Speeds (m/s) and shares of the levelling goals in the goals (paper, table of the experiment)."""
-HALVED = 50.0
-"""Percent by which the RMS of both axes is to fall at 60 mm/s."""
-MOST_HARM = 5.0
-"""Percent by which levelling may worsen the tilt of model-based control."""
 
 COMMON = (
     NO_FALL,
     Limit(figure="disengaged", bound=0),
-    Limit(figure="speed_change_percent", bound=-1.0, side="min", unit="%", over="median"),
-    Limit(figure="height_change_mm", bound=-5.0, side="min", unit="mm", over="median"),
+    Limit(figure="speed_change_percent", bound=-SPEED_NOISE, side="min", unit="%", over="median"),
+    Limit(figure="height_change_mm", bound=-1e3 * MOST_SINKING, side="min", unit="mm", over="median"),
 )
-"""What levelling must keep everywhere; one percent of speed is the noise of the windows' means."""
+"""What levelling must keep everywhere."""
 WRONG_SERVOS = (
     "sim.randomization.servo_gain=0.5", "sim.randomization.mass=0.0", "sim.randomization.com=0.0",
     "sim.randomization.friction=[0.8, 0.8]", "sim.randomization.voltage=[12.0, 12.0]",
@@ -96,7 +97,7 @@ def _paper_cases(randomize: str) -> dict[str, Case]:
             name += f"-mix-{mix:g}"
         if randomize != "none":
             name, title = f"{name}-random", f"{title}, randomised robots"
-        least = HALVED if speed <= PAPER[0][0] and mix == PAPER[0][1] else 0.0
+        least = LEAST_REDUCTION if speed <= PAPER[0][0] and mix == PAPER[0][1] else 0.0
         options = {"speed": speed, "level_mix": mix, "randomize": randomize}
         found[name] = _case(title, "cpg", _reduced("roll", least) + _reduced("pitch", least), options)
     return found

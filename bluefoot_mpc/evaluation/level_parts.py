@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from bluefoot_mpc.evaluation.cases import Case
-from bluefoot_mpc.exceptions import UnknownNameError
+from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 
 FEEDBACK, PERSISTENCE, NETWORK = "pd", "persistence", "narx"
 """The row that the others are compared with, the cheapest prediction, and the one that has to beat both."""
@@ -79,6 +79,32 @@ def with_part(case: Case, part: LevelPart) -> Case:
     """The case, levelled by this part; what the case itself overrides stays."""
     own = part.overrides(case.options["controller"])
     return replace(case, options={**case.options, "overrides": (*case.options.get("overrides", ()), *own)})
+
+
+def parts_of(name: str, case: Case, parts: Sequence[LevelPart]) -> tuple[LevelPart, ...]:
+    """Those of the parts that are meant for the case's controller.
+
+    Args:
+        name: of the case, for people.
+        case: what is run.
+        parts: what may level.
+
+    Raises:
+        ConfigurationError: there is none.
+    """
+    found = _meant_for(case, parts)
+    if not found:
+        chosen = ", ".join(part.name for part in parts)
+        valid = ", ".join(part.name for part in _meant_for(case, LEVEL_PARTS))
+        raise ConfigurationError(
+            f"case '{name}' has nothing to run: {chosen} is not measured under "
+            f"{case.options['controller']}. Take some of: {valid}, or leave the case out"
+        )
+    return found
+
+
+def _meant_for(case: Case, parts: Sequence[LevelPart]) -> tuple[LevelPart, ...]:
+    return tuple(part for part in parts if case.options["controller"] in part.controllers)
 
 
 def level_parts(names: tuple[str, ...] = ()) -> tuple[LevelPart, ...]:

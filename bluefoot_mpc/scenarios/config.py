@@ -79,7 +79,7 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
     table = read_toml(options.config) if options.config is not None else {}
     for override in options.overrides:
         table = merge(table, parse_override(override))
-    controller = _controller(table, options, scenario.default_controller)
+    controller = _controller(table, options, scenario)
     table = _without_run(table)
     stage_names = [f.name for f in fields(StageConfig)]
     for key, value in table.items():
@@ -90,7 +90,7 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
     parameters = _parameters(table, options)
     scenario_table = merge(table.get("scenario", {}), _scenario_options(scenario, options))
     made = scenario(build(scenario.Config, scenario_table, "scenario"))
-    control = merge(to_table(preset(controller, parameters)), made.control(controller))
+    control = merge(to_table(preset(controller, parameters)), _own_control(made, controller))
     table = merge({"control": control}, table)
     table = merge(table, _level_options(table, options))
     stages = build(StageConfig, {key: table[key] for key in stage_names if key in table})
@@ -104,18 +104,39 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
     )
 
 
-def _controller(table: dict[str, Any], options: RunOptions, default: str) -> str:
+def _controller(table: dict[str, Any], options: RunOptions, scenario: type[Scenario]) -> str:
     """The controller that is asked for, or the one whose configuration the file holds, or the scenario's."""
+    default = scenario.default_controller
+    if default not in CONTROLLERS:
+        raise ConfigurationError(
+            f"scenario '{scenario.name}': default_controller = {default!r} "
+            f"must be one of: {', '.join(CONTROLLERS)}"
+        )
     run = table.get("run", {})
     named = run.get("controller") if isinstance(run, Mapping) else None
     if named is not None and named not in CONTROLLERS:
         raise UnknownNameError("controller", str(named), CONTROLLERS)
     if None not in (named, options.controller) and named != options.controller and "control" in table:
+        if options.config is None:
+            raise ConfigurationError(
+                f"--set run.controller={named} and --controller {options.controller} differ: leave one out"
+            )
         raise ConfigurationError(
             f"{options.config} holds the configuration of the controller '{named}': "
             f"leave --controller {options.controller} out, or take a file without [control]"
         )
     return options.controller or named or default
+
+
+def _own_control(scenario: Scenario, controller: str) -> Mapping[str, Any]:
+    """What the scenario itself changes of the controller's configuration: may be a user's code."""
+    changes = scenario.control(controller)
+    if not isinstance(changes, Mapping):
+        raise ConfigurationError(
+            f"scenario '{scenario.name}': control() must return a table (dict) of what it changes, "
+            f"{{}} for nothing, not {changes!r}"
+        )
+    return changes
 
 
 def _without_run(table: dict[str, Any]) -> dict[str, Any]:

@@ -14,13 +14,17 @@ from bluefoot_mpc.model.parameters import load_parameters
 from bluefoot_mpc.runtime import metrics
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.runtime.window import Window, cut_window
-from bluefoot_mpc.types import FloatArray, LevelReport
+from bluefoot_mpc.types import FloatArray, LevelReport, Mode
 
 SMOOTHING = 0.5
 """s, length of the moving average behind the paper's own measure of the tilt."""
 THROUGHOUT = 0.9
 """Mean share of levelling in the goals from which it acted in a whole window, the fade apart."""
+LEAST_SPEED = 0.005
+"""m/s, mean speed from which changes in percent mean something: turning in place drifts by less."""
 _AXES = ("roll", "pitch", "tilt")
+_LATE = 0.1
+"""s after a window's start by which levelling begins to act where it is ready."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -56,7 +60,7 @@ class _Part:
 
 
 def windows_of(run: RunData, duration: float) -> list[LevelWindow]:
-    """The whole windows of a run, off first, in turns.
+    """The whole windows of a run, off first, in turns, as long as it was to walk and did.
 
     Without levelling every window is one without it: the reference.
 
@@ -69,7 +73,7 @@ def windows_of(run: RunData, duration: float) -> list[LevelWindow]:
     lengths = (schedule.get("off", 0.0), schedule.get("on", 0.0))
     if not run.truth or min(lengths) <= 0.0:
         return []
-    last = min(duration, run.truth[-1].time + run.period) + 0.5 * run.period
+    last = min(duration, run.truth[-1].time + run.period, _walked_until(run)) + 0.5 * run.period
     found: list[LevelWindow] = []
     start = run.truth[0].time + schedule["start"]
     for on, length in itertools.cycle(zip((False, True), lengths, strict=True)):
@@ -78,6 +82,17 @@ def windows_of(run: RunData, duration: float) -> list[LevelWindow]:
         found.append(LevelWindow(on=on and leveling["enabled"], start=start, end=start + length))
         start += length
     return found
+
+
+def _walked_until(run: RunData) -> float:
+    """s, end of the last tick on which walking was commanded and the controller walked."""
+    walking = (
+        command.time + run.period
+        # A log that was cut off may lack the last of either.
+        for command, record in zip(run.commands, run.telemetry, strict=False)
+        if command.motion.mode is Mode.WALK and record.mode is Mode.WALK
+    )
+    return max(walking, default=-math.inf)
 
 
 def level_figures(run: RunData, windows: Sequence[LevelWindow]) -> dict[str, Any]:
@@ -98,6 +113,11 @@ def level_figures(run: RunData, windows: Sequence[LevelWindow]) -> dict[str, Any
     )
     told = _told(run, windows, parts)
     reports = [record.level for record in run.telemetry]
+    partial = [
+        window
+        for window, row in zip(windows, told, strict=True)
+        if window.on and (row["share_mean"] or 0.0) < THROUGHOUT
+    ]
     stopped = [report.stopped for report in reports if report is not None and report.stopped]
     return {
         "leveling": any(report is not None for report in reports),
@@ -107,11 +127,10 @@ def level_figures(run: RunData, windows: Sequence[LevelWindow]) -> dict[str, Any
         "reduction_percent": {axis: _reduction(off, on, f"{axis}_rms_deg") for axis in _AXES},
         "peak_reduction_percent": {axis: _reduction(off, on, f"{axis}_peak_deg") for axis in _AXES},
         "smooth_reduction_percent": {axis: _reduction(off, on, f"{axis}_smooth_rms_deg") for axis in _AXES},
-        "speed_change_percent": _negative(_reduction(off, on, "speed_mps")),
+        "speed_change_percent": _speed_change(off, on),
         "height_change_m": on["height_m"] - off["height_m"] if off and on else None,
-        "partial_windows": sum(
-            row["kind"] == "on" and (row["share_mean"] or 0.0) < THROUGHOUT for row in told
-        ),
+        "partial_windows": len(partial),
+        "partial_reasons": list(dict.fromkeys(_why_partial(run, window) for window in partial)),
         "stopped_ticks": len(stopped),
         "stopped": list(dict.fromkeys(stopped)),
     }
@@ -196,15 +215,39 @@ def _told(run: RunData, windows: Sequence[LevelWindow], parts: Sequence[_Part]) 
 
 def _network(run: RunData, window: LevelWindow) -> dict[str, float | None]:
     """How far levelling acted on average, and the network's error and learning rate at the window's end."""
-    reports: list[LevelReport] = [
-        record.level
-        for record in run.telemetry
-        if record.level is not None and window.start - 1e-6 <= record.time < window.end - 1e-6
-    ]
+    reports = _reports(run, window)
     if not reports:
         return {"share_mean": None, "mse": None, "rate": None}
     share = float(np.mean([report.share for report in reports]))
     return {"share_mean": share, "mse": reports[-1].mse, "rate": reports[-1].rate}
+
+
+def _reports(run: RunData, window: LevelWindow) -> list[LevelReport]:
+    """What levelling told on the ticks of a window."""
+    return [
+        record.level
+        for record in run.telemetry
+        if record.level is not None and window.start - 1e-6 <= record.time < window.end - 1e-6
+    ]
+
+
+def _why_partial(run: RunData, window: LevelWindow) -> str:
+    """Why levelling did not act throughout an on window though nothing stopped it."""
+    leveling = run.config["control"]["leveling"]
+    shares = [report.share for report in _reports(run, window)]
+    waited = next((k for k, share in enumerate(shares) if share > 0.0), len(shares)) * run.period
+    if waited > _LATE and leveling.get("psi", "network") == "network":
+        return (
+            "the network first learns for control.leveling.schedule.learn_time; "
+            "take longer off windows, or --level pd"
+        )
+    fade, length = leveling["schedule"].get("fade", 0.0), window.end - window.start
+    if 0.5 * fade > (1.0 - THROUGHOUT) * length:  # The fade alone takes that much of the mean.
+        return (
+            f"it fades in for {fade:g} of their {length:g} s; "
+            "take a shorter control.leveling.schedule.fade, or longer on windows"
+        )
+    return "it let go for a while: the estimate was not to be trusted, or it did not walk"
 
 
 def _reduction(off: Mapping[str, Any], on: Mapping[str, Any], figure: str) -> float | None:
@@ -215,5 +258,7 @@ def _reduction(off: Mapping[str, Any], on: Mapping[str, Any], figure: str) -> fl
     return 100.0 * (1.0 - float(with_it) / float(without))
 
 
-def _negative(value: float | None) -> float | None:
-    return None if value is None else -value
+def _speed_change(off: Mapping[str, Any], on: Mapping[str, Any]) -> float | None:
+    """Percent by which the mean speed is higher with levelling; None where it hardly moves."""
+    lower = _reduction(off, on, "speed_mps")
+    return None if lower is None or abs(off["speed_mps"]) < LEAST_SPEED else -lower

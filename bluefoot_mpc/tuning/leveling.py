@@ -17,12 +17,15 @@ the trunk sinks and the feet shuffle. Of several cases the worst counts.
 
 from __future__ import annotations
 
+import json
 import math
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.scenarios.leveling import UNCOMPENSATED
 from bluefoot_mpc.settings import require_positive
 from bluefoot_mpc.tuning.cases import STAND, TuningCase, trot_bars
 from bluefoot_mpc.tuning.objective import FALL, Figures
@@ -53,15 +56,20 @@ PARTS: dict[str, tuple[str, ...]] = {
     "model": ('control.leveling.psi="model"',),
 }
 """Settings by part; those with ψ keep the attitude part."""
-UNLEVELLED_TROT = (
-    "control.zmp.enabled=false",
-    "control.gait.reflex.enabled=false",
-    "control.posture.level_gain=0.0",
-    *(f"control.gait.trot.cycle_{end}=1.0" for end in ("min", "max")),
-    *(f"control.gait.trot.height_{end}=0.035" for end in ("min", "max")),
-    "control.gait.trot.swing_share=0.45",
-)
-"""The paper's laws without what else keeps the trunk level, with a timing that tilts it by 2 to 3 degrees."""
+
+
+def _overrides(section: str, table: Mapping[str, Any]) -> tuple[str, ...]:
+    """A nested table as ``section.key=value``."""
+    found: list[str] = []
+    for key, value in table.items():
+        path = f"{section}.{key}"
+        # JSON writes numbers and booleans as TOML does.
+        found += _overrides(path, value) if isinstance(value, Mapping) else (f"{path}={json.dumps(value)}",)
+    return tuple(found)
+
+
+UNLEVELLED_TROT = _overrides("control", UNCOMPENSATED)
+"""The walk of scenario ``level`` under the paper's laws: gains are searched on what they are judged by."""
 OFF = ("control.leveling.enabled=false",)
 
 

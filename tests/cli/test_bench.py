@@ -187,6 +187,10 @@ def test_each_part_takes_its_own_cases_and_rows():
     assert list(alone.level_cases) == list(DEFAULT_CASES)
     assert not alone.needs_variants
     assert len(plan(parts="level", cases="all").level_cases) == 20
+    # Cases that nobody asked for are left out where none of the rows is measured in them.
+    for cases in (None, "all"):
+        mixed = plan(parts="level", variants="mix", cases=cases).level_cases
+        assert {case.options["controller"] for case in mixed.values()} == {"cpg"}
     assert list(plan(parts="ablation").cases) == list(bench_plan.ABLATION_CASES)
     assert plan(parts="ablation", duration=10.0).level_cases == {}
 
@@ -198,7 +202,9 @@ def test_each_part_takes_its_own_cases_and_rows():
         (["--parts", "level", "--cases", "level-61"], "level-60"),
         (["--parts", "ablation,level", "--cases", "payload"], "no case of level"),
         (["--parts", "level", "--variants", "cpg"], "persistence"),
-        (["--parts", "level", "--duration", "20"], "take 24 or more"),
+        (["--parts", "level", "--cases", "level-mpc-60", "--variants", "mix"], "Take some of: pd, narx"),
+        (["--parts", "level", "--cases", "level-60,level-mpc-60", "--variants", "mix"], "level-mpc-60"),
+        (["--parts", "level", "--duration", "20"], "take 34 or more"),
     ],
 )
 def test_wrong_use_of_the_part_level_is_told(level_runs, capfd, words, message):

@@ -47,7 +47,8 @@ def test_other_runs_have_no_table():
 
 def test_a_run_shows_its_windows_once(capfd, tmp_path):
     words = ["run", "level", "--level", "pd", "--duration", "8.5", "--no-report", "--out", str(tmp_path)]
-    words += ["--set", "control.leveling.schedule.off=2", "--set", "control.leveling.schedule.on=2"]
+    for key, value in {"start": 4, "off": 2, "on": 2}.items():
+        words += ["--set", f"control.leveling.schedule.{key}={value}"]
     assert main(words) in {0, 1}
     text = capfd.readouterr().out
     assert "RMS and peak tilt by window" in text

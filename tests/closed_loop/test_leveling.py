@@ -27,7 +27,7 @@ PARTS = {
 }
 ON_TOP = ("pd", "model", "network")
 """Parts that are tried with model-based control."""
-OFF, ON, START = 6.0, 6.0, 4.0
+OFF, ON, START = 6.0, 6.0, 14.0
 
 
 @cache

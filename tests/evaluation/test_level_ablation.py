@@ -78,6 +78,17 @@ def test_rows_that_mean_nothing_under_model_based_control_are_not_run(ran):
     assert {case.options["controller"] for case, _ in ran} == {"mpc"}
 
 
+def test_a_case_without_any_of_the_rows_is_refused(ran):
+    message = (
+        "'level-mpc-60' has nothing to run: mix, network is not measured under mpc. Take some of: pd, narx"
+    )
+    with pytest.raises(ConfigurationError, match=message):
+        ablated("level-60", "level-mpc-60", parts=("mix", "network"))
+    with pytest.raises(ConfigurationError, match=message):
+        missing_level_runs(level_cases(), level_parts(("mix", "network")), Store(None))
+    assert ran == []
+
+
 @pytest.mark.parametrize(
     ("changes", "seeds", "verdict"),
     [
@@ -175,14 +186,15 @@ def test_cases_have_names_of_their_own_and_the_chosen_ones_exist():
 def test_what_cannot_be_run_is_refused():
     with pytest.raises(UnknownNameError, match="level-60"):
         chosen_level_cases(["level-61"], 1, None)
-    with pytest.raises(ConfigurationError, match="take 24 or more"):
-        chosen_level_cases(["level-60"], 1, 23.0)
+    with pytest.raises(ConfigurationError, match="take 34 or more"):
+        chosen_level_cases(["level-60"], 1, 33.0)
     with pytest.raises(UnknownNameError, match="persistence"):
         level_parts(("persistance",))
 
 
 def test_a_simulated_run_gives_every_figure_of_the_table():
-    overrides = ("control.leveling.schedule.off=2", "control.leveling.schedule.on=2")
+    schedule = {"start": 4, "off": 2, "on": 2}
+    overrides = tuple(f"control.leveling.schedule.{key}={value}" for key, value in schedule.items())
     options = {"controller": "cpg", "level": "pd", "duration": 8.5, "overrides": overrides}
     found = measure(Case(name="short", scenario="level", options=options), 0)
     assert set(SHOWN) <= found.keys()

@@ -116,6 +116,35 @@ def test_a_push_beyond_all_sense_is_refused():
         resolve(Push, RunOptions(impulse=1e9))
 
 
+def test_two_controllers_on_one_command_line_are_told_apart():
+    overrides = ("run.controller=cpg", "control.zmp.gain=1.0")
+    message = "^--set run.controller=cpg and --controller mpc differ: leave one out"
+    with pytest.raises(ConfigurationError, match=message):
+        resolve(Walk, RunOptions(controller="mpc", overrides=overrides))
+
+
+@pytest.mark.parametrize("value", [None, [("zmp", 1)], "zmp"])
+def test_a_scenario_that_changes_no_table_is_refused(value):
+    class Mine(Walk):
+        name = "mine"
+
+        def control(self, controller):
+            return value
+
+    with pytest.raises(ConfigurationError, match="'mine': control\\(\\) must return a table"):
+        resolve(Mine, RunOptions())
+
+
+@pytest.mark.parametrize("value", [None, "pid", 3, ["cpg"]])
+def test_a_scenario_with_a_controller_that_does_not_exist_is_refused(value):
+    class Mine(Walk):
+        name = "mine"
+        default_controller = value
+
+    with pytest.raises(ConfigurationError, match="'mine': default_controller = .* must be one of: cpg, mpc"):
+        resolve(Mine, RunOptions(controller="cpg"))
+
+
 def test_a_missing_configuration_file_is_named(tmp_path):
     with pytest.raises(ConfigurationError, match="cannot read .*absent.toml"):
         resolve(Walk, RunOptions(config=tmp_path / "absent.toml"))

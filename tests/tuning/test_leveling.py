@@ -108,6 +108,9 @@ def test_the_papers_laws_get_a_gait_that_tilts_and_model_based_control_keeps_its
     assert not tilting.zmp.enabled
     assert not tilting.gait.reflex.enabled
     assert tilting.gait.trot.cycle_min == tilting.gait.trot.cycle_max == 1.0
+    # Gains are searched on the walk that they are judged by.
+    judged = resolve(find_scenario("level"), RunOptions()).stages.control
+    assert replace(tilting, leveling=judged.leveling) == judged
     own = control(LevelCase(controller="mpc"))
     plain = resolve(find_scenario("walk"), RunOptions(controller="mpc")).stages.control
     assert replace(own, leveling=plain.leveling) == plain
