@@ -71,7 +71,7 @@ def _sentence(data: dict[str, Any]) -> str:
 
 
 def _todays_controller(log: RunLog) -> Step:
-    pipeline = pipeline_from_log(log)
+    pipeline = pipeline_from_log(log, log.path.parent)
 
     def step(frame: SensorFrame, motion: MotionCommand, safety: SafetyRequest) -> JointCommand:
         return pipeline.step(frame, motion, safety).command

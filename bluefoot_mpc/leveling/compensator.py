@@ -26,6 +26,8 @@ from bluefoot_mpc.types import N_LEGS, BodyState, FloatArray, LevelReport
 
 _UNKNOWN: FloatArray = np.full(3, np.nan)
 _ROUNDING = 1e-9
+_LATE = 0.25
+"""Share of a period by which a frame may be late and still end the period after the one before."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -81,6 +83,8 @@ class Compensator:
         self._source.reset()
         self._guard.reset()
         self._share = 0.0
+        self._began = math.nan
+        self._time = math.nan
         self._before: FloatArray | None = None
 
     def step(self, inputs: LevelingInputs, dt: float) -> Leveled:
@@ -95,17 +99,23 @@ class Compensator:
         q = np.concatenate([estimate.position, estimate.quaternion, estimate.joint_position])
         dynamics = self._mass(q, estimate)
         target = self._measured(dynamics, inputs, speed, dt)
-        learning = inputs.walking and schedule.may_learn(self._share, self._config.schedule)
-        situation = self._situation(inputs, q, speed, target, learn=learning)
+        if math.isnan(self._began):
+            self._began = estimate.time
+        scheduled = schedule.wants_on(estimate.time - self._began, self._config.schedule)
+        wanted = inputs.walking and scheduled and self._source.ready
+        learning = inputs.walking and estimate.healthy
+        learning &= schedule.may_learn(wanted or self._share > 0.0, self._config.schedule)
+        situation = self._situation(inputs, q, speed, target, dynamics.from_force, learn=learning)
         predicted = self._source.step(situation, dt)
         if predicted is not None and not np.isfinite(predicted).all():
             predicted = None
-        self._engage(inputs, predicted, dt)
+        self._engage(inputs, wanted, predicted, dt)
         psi = self._bounded(dynamics, predicted)
         torque = self._torque(dynamics, inputs, psi)
         goals = self._mixed(inputs, torque, dt)
         self._made.send(goals)
         self._before = speed if np.isfinite(speed).all() else None
+        self._time = estimate.time
         report = LevelReport(
             share=self._share, training=learning and target is not None and self._learns,
             stopped=self._guard.stopped, disturbance=psi,
@@ -131,7 +141,9 @@ class Compensator:
         """(22,) ψ of the period that just ended; None where a part of it is unknown."""
         estimate = inputs.estimate
         torque = self._made.torque(estimate.joint_position, inputs.joint_load, inputs.voltage, dt)
-        if torque is None or self._before is None or not np.isfinite(speed).all():
+        # A period with a frame lost in it is longer: its mean acceleration would count twice.
+        lost = not abs(estimate.time - self._time - dt) <= _LATE * dt
+        if lost or torque is None or self._before is None or not np.isfinite(speed).all():
             return None
         target = disturbance(dynamics.mass, self._before, speed, torque, dt)
         return target if np.isfinite(target).all() else None
@@ -142,6 +154,7 @@ class Compensator:
         q: FloatArray,
         speed: FloatArray,
         target: FloatArray | None,
+        turn: FloatArray,
         *,
         learn: bool,
     ) -> Situation:
@@ -151,19 +164,19 @@ class Compensator:
         if inputs.specific_force is not None:
             forces = contact_forces(self._dynamics.mass, rotation @ inputs.specific_force, estimate.contact)
         return Situation(
-            target=target, q=q, v=speed, forces=forces, learn=learn,
+            target=target, q=q, v=speed, forces=forces, turn=turn, learn=learn,
             inputs=network_inputs(inputs, rotation, self._neutral, speed, forces),
         )  # fmt: skip
 
-    def _engage(self, inputs: LevelingInputs, predicted: FloatArray | None, dt: float) -> None:
-        """Let schedule, source and guard decide how far to act."""
+    def _engage(self, inputs: LevelingInputs, wanted: bool, predicted: FloatArray | None, dt: float) -> None:
+        """Let schedule (`wanted`), source and guard decide how far to act."""
         estimate, config = inputs.estimate, self._config.schedule
         tilt = math.hypot(*(estimate.rpy[:2] - inputs.tilt_reference).tolist())
         healthy = estimate.healthy and math.isfinite(tilt)
         if inputs.walking:
             self._guard.watch(tilt, self._source.fault, self._doubt(healthy, predicted), dt)
-        wanted = inputs.walking and schedule.wants_on(estimate.time, config) and self._source.ready
-        self._share = schedule.faded(self._share, wanted and not self._guard.stopped, dt, config)
+        acts = wanted and self._source.ready and not self._guard.stopped
+        self._share = schedule.faded(self._share, acts, dt, config)
         if not healthy or predicted is None:
             self._share = 0.0  # Nothing to act on, not even while it fades.
 

@@ -108,6 +108,11 @@ class LevelingConfig:
     limits: LevelingLimits = field(default_factory=LevelingLimits)
     narx: NarxConfig = field(default_factory=NarxConfig)
 
+    @property
+    def loads_weights(self) -> bool:
+        """Whether a network begins with the weights of a file."""
+        return self.enabled and self.psi == "network" and bool(self.weights)
+
     def __post_init__(self) -> None:
         """Check ranges."""
         if not 0.0 < self.mix < 1.0:

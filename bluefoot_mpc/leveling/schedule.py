@@ -6,7 +6,7 @@ from bluefoot_mpc.leveling.config import ScheduleConfig
 
 
 def wants_on(time: float, config: ScheduleConfig) -> bool:
-    """Whether the compensator is to act at `time` (s of the run)."""
+    """Whether the compensator is to act at `time` (s since the start of the run)."""
     if config.on == 0.0:
         return time >= config.start + config.off
     since = time - config.start
@@ -14,9 +14,9 @@ def wants_on(time: float, config: ScheduleConfig) -> bool:
     return since >= 0.0 and (since + 1e-6) % (config.off + config.on) >= config.off
 
 
-def may_learn(share: float, config: ScheduleConfig) -> bool:
-    """Whether the network may learn while the compensator acts with `share` (0..1)."""
-    return config.learn == "always" or (config.learn == "off" and share == 0.0)
+def may_learn(acts: bool, config: ScheduleConfig) -> bool:
+    """Whether the network may learn; `acts` while the compensator acts, fades, or pauses in an on window."""
+    return config.learn == "always" or (config.learn == "off" and not acts)
 
 
 def faded(share: float, wanted: bool, dt: float, config: ScheduleConfig) -> float:

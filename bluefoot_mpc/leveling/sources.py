@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.leveling.config import LevelingConfig
 from bluefoot_mpc.leveling.narx import Narx, NarxWeights, load_weights
 from bluefoot_mpc.leveling.signals import INPUT_SCALE, OUTPUT_SCALE, OUTPUTS
@@ -17,6 +18,8 @@ from bluefoot_mpc.types import FloatArray
 
 NOTHING: FloatArray = np.zeros(OUTPUTS)
 NOTHING.setflags(write=False)
+USELESS = 2.0
+"""Power of the error over the signal's from which a network is not acted upon; persistence reaches 1.5."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -29,6 +32,7 @@ class Situation:
         q: (23,) configuration; position, quaternion x y z w, joints.
         v: (22,) velocity.
         forces: (4, 3) N, estimated ground forces, world axes.
+        turn: (3, 22) Γ1 M̂⁻¹, what forces do to the trunk's rotation.
         learn: whether a source that learns may.
     """
 
@@ -37,6 +41,7 @@ class Situation:
     q: FloatArray
     v: FloatArray
     forces: FloatArray
+    turn: FloatArray
     learn: bool
 
 
@@ -125,12 +130,12 @@ class Network:
     """The NARX network: learns ψ while it may, predicts it always.
 
     Attributes:
-        trust: share of the disturbance's power that it explains of late.
+        trust: share that it explains of late of the angular accelerations about the horizontal axes.
         mse: low-passed squared error, scaled units.
         rate: learning rate.
         ready: True with loaded weights, or once it has learnt for long enough.
         fault: why it is out of use; empty while it is not.
-        doubt: set while it predicts worse than who always says zero.
+        doubt: set while it predicts those clearly worse than who always says zero.
 
     Args:
         config: of the compensator.
@@ -142,6 +147,11 @@ class Network:
     def __init__(self, config: LevelingConfig) -> None:
         self._narx = Narx(config.narx, INPUT_SCALE, OUTPUT_SCALE)
         self._weights = load_weights(Path(config.weights)) if config.weights else None
+        if self._weights is not None:
+            try:
+                self._narx.load_weights(self._weights)
+            except ConfigurationError as error:
+                raise ConfigurationError(f"{config.weights}: {error}") from error
         self._learn_time = config.schedule.learn_time
         self.reset()
 
@@ -151,6 +161,8 @@ class Network:
         if self._weights is not None:
             self._narx.load_weights(self._weights)
         self._learnt = 0.0
+        self._predicted: FloatArray | None = None
+        self._missed = self._power = 0.0
         self._note()
 
     @property
@@ -161,19 +173,29 @@ class Network:
     def step(self, situation: Situation, dt: float) -> FloatArray | None:
         """(22,) predicted ψ; None after a bad input, or once the network has diverged."""
         if situation.target is not None:
+            self._judge(situation.target, situation.turn[:2])
             self._narx.train(situation.target, learn=situation.learn)
             self._learnt += dt if situation.learn else 0.0
         prediction = self._narx.predict(situation.inputs)
+        self._predicted = prediction.value if prediction.valid else None
         self._note()
-        return prediction.value if prediction.valid else None
+        return self._predicted
+
+    def _judge(self, target: FloatArray, turn: FloatArray) -> None:
+        """Follow how much of what turns the trunk the last prediction missed."""
+        if self._predicted is None:
+            return
+        weight = self._narx.config.mse_weight
+        wanted, missed = turn @ target, turn @ (target - self._predicted)
+        self._power += weight * (float(wanted @ wanted) - self._power)
+        self._missed += weight * (float(missed @ missed) - self._missed)
 
     def _note(self) -> None:
         self.mse, self.rate = self._narx.mse, self._narx.rate
-        power = self._narx.power
-        self.trust = min(1.0, max(0.0, 1.0 - self.mse / power)) if power > 0.0 else 0.0
+        self.trust = max(0.0, 1.0 - self._missed / self._power) if self._power > 0.0 else 0.0
         self.ready = self._weights is not None or self._learnt >= self._learn_time - 1e-9
         self.fault = "the network has diverged" if self._narx.diverged else ""
-        useless = self.ready and self._narx.mse > self._narx.power
+        useless = self.ready and self._missed > USELESS * self._power
         self.doubt = "the network predicts worse than nothing" if useless else ""
 
 

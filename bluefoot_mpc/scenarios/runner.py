@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
-import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +17,6 @@ from bluefoot_mpc.exceptions import ConfigurationError, LogError
 from bluefoot_mpc.io.pacing import PacedRobot
 from bluefoot_mpc.io.robot import Robot
 from bluefoot_mpc.io.safety import SafetySupervisor
-from bluefoot_mpc.leveling.narx import save_weights
 from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
@@ -29,17 +26,25 @@ from bluefoot_mpc.runtime.recorder import Recorder
 from bluefoot_mpc.runtime.summary import summarize
 from bluefoot_mpc.scenarios.base import Criterion
 from bluefoot_mpc.scenarios.config import Resolved, resolve
+from bluefoot_mpc.scenarios.folder import (
+    CONFIG,
+    LOG,
+    REPORT,
+    START_WEIGHTS,
+    SUMMARY,
+    WEIGHTS,
+    keep_weights,
+    log_in,
+    make_folder,
+    start_weights,
+    writing,
+)
 from bluefoot_mpc.scenarios.options import RunOptions
 from bluefoot_mpc.scenarios.registry import find_scenario
 from bluefoot_mpc.settings import build, dump_toml
 from bluefoot_mpc.sim.robot import SimRobot
 from bluefoot_mpc.viz.live import LiveView
 from bluefoot_mpc.viz.report import write_report
-
-LOG, SUMMARY, REPORT, CONFIG = "log.mcap", "summary.json", "report.html", "config.toml"
-"""Files that a run writes into its folder."""
-WEIGHTS = "narx.npz"
-"""What the levelling network has learnt, where one ran; ``control.leveling.weights`` takes it."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -134,10 +139,14 @@ def run_commanded(
     presentation = presentation or Presentation()
     made = _prepare(resolved)
     simulator = made.simulator
-    folder = _make_folder(options, resolved.run.scenario)
-    with _writing(folder / CONFIG):
+    folder = make_folder(options, resolved.run.scenario)
+    if resolved.stages.control.leveling.loads_weights:
+        # A copy: the file that was named may change, this run itself may write it.
+        keep_weights(made.pipeline.learnt, folder / START_WEIGHTS)
+        made.table["control"]["leveling"]["weights"] = str((folder / START_WEIGHTS).resolve())
+    with writing(folder / CONFIG):
         (folder / CONFIG).write_text(dump_toml(made.table), encoding="utf-8")
-    with _log_in(folder):
+    with log_in(folder):
         with _observers(made.model, resolved, options, presentation) as observers:
             paced = options.view if presentation.paced is None else presentation.paced
             robot = PacedRobot(simulator) if paced else simulator
@@ -147,7 +156,7 @@ def run_commanded(
                 recorder.finish(data.stop_reason, data.real_time_factor)
         result = _judge(data, resolved, made.model, folder)
         _write_results(result, made.model, options.report)
-        _write_weights(made.pipeline, folder / WEIGHTS)
+        keep_weights(made.pipeline.learnt, folder / WEIGHTS)
     return result
 
 
@@ -200,44 +209,13 @@ def _observers(
 
 def _write_results(result: RunResult, model: RobotModel, report: bool) -> None:
     text = orjson.dumps(result.summary, option=orjson.OPT_INDENT_2 | orjson.OPT_SERIALIZE_NUMPY)
-    with _writing(result.folder / SUMMARY):
+    with writing(result.folder / SUMMARY):
         (result.folder / SUMMARY).write_bytes(text + b"\n")
     if not report:
         return
     checks = [dataclasses.asdict(criterion) for criterion in result.criteria]
-    with _writing(result.folder / REPORT):
+    with writing(result.folder / REPORT):
         write_report(result.data, result.summary, model, result.folder / REPORT, checks)
-
-
-def _write_weights(pipeline: Pipeline, file: Path) -> None:
-    """Keep what the levelling network has learnt, where one ran."""
-    if pipeline.learnt is not None:
-        with _writing(file):
-            save_weights(file, pipeline.learnt)
-
-
-@contextmanager
-def _writing(file: Path) -> Iterator[None]:
-    """Turn what hinders writing a file into one message; half a file is not left behind."""
-    try:
-        yield
-    except BaseException as error:
-        with suppress(OSError):
-            file.unlink()
-        if isinstance(error, OSError):
-            raise ConfigurationError(f"cannot write {file}: {error.strerror or error}") from error
-        raise
-
-
-@contextmanager
-def _log_in(folder: Path) -> Iterator[None]:
-    """Tell with any error where the log lies that was written until then."""
-    try:
-        yield
-    except BaseException as error:
-        if (folder / LOG).is_file():
-            error.add_note(f"the log, as far as it goes, is in {folder / LOG}")
-        raise
 
 
 def _drive(
@@ -260,17 +238,26 @@ def supervise(robot: Robot, model: RobotModel, resolved: Resolved) -> SafetySupe
     return SafetySupervisor(robot, model.lower, model.upper, resolved.stages.safety)
 
 
-def pipeline_from_log(data: RunData) -> Pipeline:
+def pipeline_from_log(data: RunData, folder: Path | None = None) -> Pipeline:
     """The controller that a log's configuration describes, as today's code builds it.
 
+    Args:
+        data: the run.
+        folder: where its log lies, with the weights that its network began with; None where they
+            are to be read from where the configuration says.
+
     Raises:
-        LogError: the log does not hold a configuration that today's code understands.
+        LogError: the log does not hold a configuration that today's code understands, or the
+            weights are gone.
     """
     try:
         parameters = build(RobotParameters, data.config["model"], "model")
         control = build(ControlConfig, data.config["control"], "control")
     except (KeyError, ConfigurationError) as error:
         raise LogError(f"the log's configuration does not fit this version: {error}") from error
+    if folder is not None and control.leveling.loads_weights:
+        leveling = dataclasses.replace(control.leveling, weights=start_weights(folder))
+        control = dataclasses.replace(control, leveling=leveling)
     return Pipeline(RobotModel(parameters), control, data.period)
 
 
@@ -280,28 +267,3 @@ def _judge(data: RunData, resolved: Resolved, model: RobotModel, folder: Path) -
     criteria = scenario.criteria(summary)
     summary["success"] = success = all(criterion.holds for criterion in criteria)
     return RunResult(summary=summary, folder=folder, criteria=criteria, success=success, data=data)
-
-
-def _make_folder(options: RunOptions, scenario: str) -> Path:
-    """The folder of a run: the one asked for, without an earlier run's results, or a new one."""
-    folder = options.out or Path("runs") / f"{time.strftime('%Y%m%d-%H%M%S')}-{scenario}"
-    try:
-        if options.out is None:
-            return _new_folder(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        for name in (LOG, SUMMARY, REPORT, CONFIG, WEIGHTS):
-            (folder / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise ConfigurationError(f"cannot write to --out {folder}: {error.strerror or error}") from error
-    return folder
-
-
-def _new_folder(wanted: Path) -> Path:
-    """A folder that nobody else has: two runs may start in the same second."""
-    wanted.parent.mkdir(parents=True, exist_ok=True)
-    for number in itertools.count(1):
-        folder = wanted if number == 1 else wanted.with_name(f"{wanted.name}-{number}")
-        with suppress(FileExistsError):
-            folder.mkdir()
-            break
-    return folder

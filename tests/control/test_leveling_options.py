@@ -184,3 +184,18 @@ def test_a_run_can_go_on_learning_in_its_own_folder(tmp_path):
     words = ["run", "walk", "--duration", "0.1", "--no-report", "--out", str(tmp_path)]
     assert main([*words, *set_(f"weights='{path}'")]) in (0, 1)
     assert path.is_file()
+
+
+def test_a_run_with_loaded_weights_is_thought_through_again_wherever_it_lies(tmp_path, capfd, monkeypatch):
+    """Also after the run has written what it learnt over the file that it began with."""
+    path = file_of(tmp_path)
+    words = ["run", "walk", "--duration", "4", "--no-report", "--out", str(tmp_path)]
+    always = ["--set", "control.leveling.schedule.learn='always'"]
+    assert main([*words, *set_(f"weights='{path}'"), *always]) in (0, 1)
+    moved = tmp_path.rename(tmp_path.with_name("moved"))
+    monkeypatch.chdir(moved.parent)
+    assert main(["replay", str(moved / "log.mcap"), "--rethink"]) == 0
+    (moved / "narx_start.npz").unlink()
+    capfd.readouterr()
+    assert main(["replay", str(moved / "log.mcap"), "--rethink"]) == 2
+    assert "put it back" in " ".join(capfd.readouterr().err.split())

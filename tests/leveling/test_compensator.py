@@ -204,3 +204,26 @@ def test_what_it_was_given_stays_as_it_was():
     last(law, inputs, 5)
     np.testing.assert_array_equal(inputs.goals, goals)
     np.testing.assert_array_equal(MOVED.joint_position, joints)
+
+
+# Time.
+
+
+def test_windows_count_from_the_first_tick_whatever_the_clock_says():
+    law = compensator(psi="zero", schedule=ScheduleConfig(off=0.2, on=0.2, fade=1e-3))
+    shares = [law.step(at(1000.0 + DT * k, INPUTS), DT).report.share for k in range(20)]
+    assert shares == [0.0] * 10 + [1.0] * 10
+
+
+def test_a_period_with_a_lost_frame_tells_nothing():
+    law = compensator(psi="persistence")
+    times = np.array([0.0, 1.0, 2.0, 4.0, 5.0, 6.0]) * DT + 1.0
+    known = [np.isfinite(law.step(at(time, INPUTS), DT).report.measured).all() for time in times]
+    assert known == [False, False, True, False, True, True]
+
+
+def test_the_network_learns_neither_of_a_blind_estimate_nor_while_it_only_pauses(monkeypatch):
+    law, source = told(monkeypatch, None, schedule=ScheduleConfig(off=0.2, on=0.2, fade=1e-3))
+    for k in range(20):
+        law.step(at(DT * k, seen(replace(MOVED, healthy=k != 3))), DT)
+    assert [s.learn for s in source.seen] == [k < 10 and k != 3 for k in range(20)]

@@ -61,15 +61,15 @@ def test_without_off_windows_it_acts_all_the_time(on, later):
 
 
 @pytest.mark.parametrize(
-    ("learn", "share", "may"),
+    ("learn", "acts", "may"),
     [
-        ("off", 0.0, True), ("off", 1e-12, False), ("off", 1.0, False),
-        ("always", 0.0, True), ("always", 1.0, True),
-        ("never", 0.0, False), ("never", 1.0, False),
+        ("off", False, True), ("off", True, False),
+        ("always", False, True), ("always", True, True),
+        ("never", False, False), ("never", True, False),
     ],
 )  # fmt: skip
-def test_when_the_network_may_learn(learn, share, may):
-    assert schedule.may_learn(share, ScheduleConfig(learn=learn)) is may
+def test_when_the_network_may_learn(learn, acts, may):
+    assert schedule.may_learn(acts, ScheduleConfig(learn=learn)) is may
 
 
 @given(fade=st.floats(0.001, 2.0), dt=st.floats(0.001, 0.1))
