@@ -52,11 +52,12 @@ def test_every_part_walks_without_disengaging(part, controller):
     off, on = found["windows"]
     assert off["share_mean"] == 0.0
     assert on["share_mean"] > 0.97
-    assert found["speed_change_percent"] > -6.0
+    # Measured: -0.8 to +1.7 %; softer servos alone, -8 %.
+    assert found["speed_change_percent"] > (-12.0 if part == "mixing" else -3.0)
     assert found["height_change_m"] > -0.005
 
 
-# Measured: 2.60° of roll and 2.38° of pitch RMS without, which fall by 50 to 51 % with either.
+# Measured: 2.60° of roll and 2.38° of pitch RMS without, which fall by 52 to 54 % with either.
 @pytest.mark.parametrize("part", ["pd", "persistence", "model", "network"])
 @pytest.mark.parametrize("axis", ["roll", "pitch"])
 def test_with_attitude_feedback_the_slow_trot_tilts_less(part, axis):
@@ -66,13 +67,13 @@ def test_with_attitude_feedback_the_slow_trot_tilts_less(part, axis):
     assert found["peak_reduction_percent"][axis] >= 20.0
 
 
-# Measured: 4 to 5 %.
+# Measured: 6 to 7 %.
 @pytest.mark.parametrize("axis", ["roll", "pitch"])
 def test_softer_servos_alone_do_not_level_it(axis):
     assert -10.0 < figures("mixing")["reduction_percent"][axis] < 20.0
 
 
-# Measured: 0.11° of tilt without, and within 0.02° of it with: a bound against harm, not the figure to reach.
+# Measured: 0.10° of tilt without, and 0.01 to 0.02° more with: a bound against harm, not the figure to reach.
 @pytest.mark.parametrize("part", ON_TOP)
 def test_on_top_of_model_based_control_it_does_no_harm(part):
     found = figures(part, "mpc")
@@ -179,6 +180,11 @@ def test_a_levelled_run_can_be_rethought(tmp_path, capfd, controller, words):
 def test_what_a_run_has_learnt_can_be_given_to_the_next(tmp_path):
     words = ["run", "walk", "--controller", "cpg", "--level", "narx", "--duration", "4", "--no-report"]
     assert main([*words, "--out", str(tmp_path / "a")]) in (0, 1)
-    taught = f"control.leveling.weights='{tmp_path / 'a' / 'narx.npz'}'"
-    assert main([*words, "--set", taught, "--out", str(tmp_path / "b")]) in (0, 1)
-    assert (tmp_path / "b" / "narx.npz").read_bytes() != (tmp_path / "a" / "narx.npz").read_bytes()
+    learnt = tmp_path / "a" / "narx.npz"
+    words += ["--set", f"control.leveling.weights='{learnt}'"]
+    # Taught, it is to act from the start, and off windows, in which it would learn, there are none.
+    assert main([*words, "--out", str(tmp_path / "b")]) in (0, 1)
+    assert (tmp_path / "b" / "narx.npz").read_bytes() == learnt.read_bytes()
+    words += ["--set", "control.leveling.schedule.learn='always'"]
+    assert main([*words, "--out", str(tmp_path / "c")]) in (0, 1)
+    assert (tmp_path / "c" / "narx.npz").read_bytes() != learnt.read_bytes()

@@ -18,6 +18,7 @@ from bluefoot_mpc.scenarios import (
     run_commanded,
     runner,
 )
+from bluefoot_mpc.scenarios import folder as folder_module
 from bluefoot_mpc.scenarios.config import resolve
 from bluefoot_mpc.scenarios.registry import SHIPPED
 from bluefoot_mpc.scenarios.runner import simulate
@@ -107,7 +108,7 @@ def test_an_unwritable_folder_is_named(tmp_path):
 
 def test_two_runs_of_the_same_second_have_a_folder_each(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(runner.time, "strftime", lambda _: "now")
+    monkeypatch.setattr(folder_module.time, "strftime", lambda _: "now")
     options = RunOptions(duration=0.1, report=False)
     folders = [run("stand", options).folder for _ in range(2)]
     assert folders == [Path("runs/now-stand"), Path("runs/now-stand-2")]
