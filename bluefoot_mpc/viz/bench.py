@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bluefoot_mpc.viz.bench_level import level_panels, level_table
+from bluefoot_mpc.viz.bench_level import level_panels, level_table, medians
 from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
 from bluefoot_mpc.viz.plots import Panel, Trace
 from bluefoot_mpc.viz.style import COM, COMMAND, ESTIMATE, GOOD, NEUTRAL, ZMP
@@ -95,17 +95,8 @@ def _tilt_bars(data: Data, index: int, variant: str) -> Trace:
         "type": "bar",
         "name": variant,
         "x": [data["cases"][row["case"]] for row in rows],
-        "y": [None if f is None else f["median"] for f in found],
+        **medians(found),
         "marker": {"color": _colour(index)},
-        "error_y": {
-            "type": "data",
-            "symmetric": False,
-            "array": [None if f is None else f["max"] - f["median"] for f in found],
-            "arrayminus": [None if f is None else f["median"] - f["min"] for f in found],
-            "thickness": 1.2,
-            "width": 3,
-            "color": "@ink",
-        },
         "hovertemplate": "%{y:.2f}°",
     }
 

@@ -60,8 +60,20 @@ def _bars(level: Data, part: str, figure: str) -> Trace:
         "type": "bar",
         "name": part,
         "x": [level["cases"][row["case"]] for row in rows],
-        "y": [None if f is None else f["median"] for f in found],
+        **medians(found),
         "marker": {"color": _COLOURS.get(part, NEUTRAL)},
+        "hovertemplate": "%{y:.1f} %",
+    }
+
+
+def medians(found: Sequence[Mapping[str, float] | None]) -> Trace:
+    """Part of a trace: medians of a figure over the seeds, with whiskers to the least and the greatest.
+
+    Args:
+        found: median, min and max of every bar; None where they are unknown.
+    """
+    return {
+        "y": [None if f is None else f["median"] for f in found],
         "error_y": {
             "type": "data",
             "symmetric": False,
@@ -71,7 +83,6 @@ def _bars(level: Data, part: str, figure: str) -> Trace:
             "width": 2,
             "color": "@ink",
         },
-        "hovertemplate": "%{y:.1f} %",
     }
 
 
