@@ -99,10 +99,7 @@ class Compensator:
         q = np.concatenate([estimate.position, estimate.quaternion, estimate.joint_position])
         dynamics = self._mass(q, estimate)
         target = self._measured(dynamics, inputs, speed, dt)
-        if math.isnan(self._began):
-            self._began = estimate.time
-        scheduled = schedule.wants_on(estimate.time - self._began, self._config.schedule)
-        wanted = inputs.walking and scheduled and self._source.ready
+        wanted = self._wanted(inputs)
         learning = inputs.walking and estimate.healthy
         learning &= schedule.may_learn(wanted or self._share > 0.0, self._config.schedule)
         situation = self._situation(inputs, q, speed, target, dynamics.from_force, learn=learning)
@@ -124,6 +121,13 @@ class Compensator:
             mse=self._source.mse, rate=self._source.rate,
         )  # fmt: skip
         return Leveled(goals=goals, report=report)
+
+    def _wanted(self, inputs: LevelingInputs) -> bool:
+        """Whether the schedule asks it to act, and there is something to act on."""
+        if math.isnan(self._began):
+            self._began = inputs.estimate.time
+        since = inputs.estimate.time - self._began
+        return inputs.walking and self._source.ready and schedule.wants_on(since, self._config.schedule)
 
     @property
     def _learns(self) -> bool:
@@ -175,7 +179,7 @@ class Compensator:
         healthy = estimate.healthy and math.isfinite(tilt)
         if inputs.walking:
             self._guard.watch(tilt, self._source.fault, self._doubt(healthy, predicted), dt)
-        acts = wanted and self._source.ready and not self._guard.stopped
+        acts = wanted and not self._guard.stopped
         self._share = schedule.faded(self._share, acts, dt, config)
         if not healthy or predicted is None:
             self._share = 0.0  # Nothing to act on, not even while it fades.
