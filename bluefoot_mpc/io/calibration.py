@@ -24,7 +24,7 @@ from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.io.findings import Finding, Severity
 from bluefoot_mpc.model.parameters import RobotParameters, load_parameters
 from bluefoot_mpc.settings import build, dump_toml, read_toml, require_range, to_table
-from bluefoot_mpc.types import JOINTS, LEG_JOINTS, N_JOINTS, N_LEGS, FloatArray
+from bluefoot_mpc.types import JOINTS, LEG_JOINTS, N_JOINTS, FloatArray
 
 MIDDLE = 512
 """Count of the servo's middle."""
@@ -236,9 +236,8 @@ def findings(
     found = [*_whole(calibration, model)]
     for joint in calibration.joints:
         found += _of_joint(joint, None if servos is None else servos.get(joint.id))
-    return tuple(found) or (
-        Finding(part="calibration", text=f"made {calibration.made}, all joints verified"),
-    )
+    sound = Finding(part="calibration", text=f"made {calibration.made}, all joints verified")
+    return tuple(found) or (sound,)
 
 
 def _whole(calibration: Calibration, model: str) -> list[Finding]:
@@ -285,17 +284,14 @@ def _date(key: str, text: str) -> datetime:
     try:
         date = datetime.fromisoformat(text)
     except ValueError:
-        raise ConfigurationError(
-            f"{key} = '{text}' is not a date such as 2026-01-31T12:00:00+00:00"
-        ) from None
+        example = "2026-01-31T12:00:00+00:00"
+        raise ConfigurationError(f"{key} = '{text}' is not a date such as {example}") from None
     return date if date.tzinfo else date.replace(tzinfo=UTC)
 
 
 def servo_ids() -> tuple[int, ...]:
     """IDs of a robot as it should be: 4·leg + joint + 1."""
-    return tuple(
-        len(LEG_JOINTS) * leg + joint + 1 for leg in range(N_LEGS) for joint in range(len(LEG_JOINTS))
-    )
+    return tuple(range(1, N_JOINTS + 1))
 
 
 def joint_of_id(servo: int) -> str:

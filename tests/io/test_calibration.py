@@ -50,7 +50,7 @@ def test_nominal_is_the_middle_and_counter_clockwise(nominal):
     assert nominal.counts(np.zeros(16)).tolist() == [512] * 16
     assert nominal.counts(np.full(16, math.radians(30.0))).tolist() == [512 + 102] * 16
     assert nominal.ids == servo_ids() == tuple(range(1, 17))
-    lower, upper = nominal.soft_limits
+    _, upper = nominal.soft_limits
     assert np.degrees(upper[:4]).tolist() == pytest.approx([45, 90, 90, 90])
     assert not refusals(findings(nominal, "bluefoot"))
 
@@ -149,7 +149,7 @@ def test_an_unverified_joint_refuses(nominal):
 
 def test_another_servo_refuses(nominal):
     calibration = nominal.with_joint(2, firmware=24)
-    seen = {servo: (AX12_MODEL, 24) for servo in nominal.ids}
+    seen = dict.fromkeys(nominal.ids, (AX12_MODEL, 24))
     assert not refusals(findings(calibration, "bluefoot", seen))
     (refusal,) = refusals(findings(calibration, "bluefoot", seen | {3: (AX12_MODEL, 22)}))
     assert "servo 3 (FL_knee)" in refusal
