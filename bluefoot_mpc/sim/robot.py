@@ -5,26 +5,15 @@ from __future__ import annotations
 import math
 from collections import deque
 
-import mujoco
 import numpy as np
 
-from bluefoot_mpc.exceptions import SimulationError
 from bluefoot_mpc.model.robot import RobotModel
+from bluefoot_mpc.sim.body import NEVER, Posture, SimBody
 from bluefoot_mpc.sim.config import SimConfig
-from bluefoot_mpc.sim.inertial import InertialWindows
-from bluefoot_mpc.sim.randomization import draw
-from bluefoot_mpc.sim.sensors import SAMPLE, Probe, Sensors
-from bluefoot_mpc.sim.servo import BankConfig, Plant, ServoBank
-from bluefoot_mpc.sim.terrain import Ground
-from bluefoot_mpc.sim.truth import TruthReader
-from bluefoot_mpc.sim.world import World, build_world
-from bluefoot_mpc.types import N_JOINTS, FloatArray, JointCommand, SensorFrame, TruthSample
-
-_SENSORS_OFF = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
-_NEVER = 1 << 62
+from bluefoot_mpc.types import N_JOINTS, JointCommand, SensorFrame
 
 
-class SimRobot:
+class SimRobot(SimBody):
     """BlueFoot in MuJoCo: servos, sensors and battery as the hardware has them.
 
     It starts standing in its default stance, at rest. The same seed and commands
@@ -32,99 +21,30 @@ class SimRobot:
 
     Attributes:
         period: s, command period.
-        drawn: what randomisation made of this run, for a log.
         discarded_commands: how many commands were not finite and therefore ignored.
     """
 
     def __init__(self, robot: RobotModel, config: SimConfig, seed: int = 0) -> None:
-        self.config = config
+        super().__init__(robot, config, seed, config.command_period)
         self.period = config.command_period
-        drawn = draw(config, seed)
-        self.drawn = drawn.as_dict()
-        self._robot = robot
-        self._world = build_world(robot, config, drawn)
-        self._steps = round(config.command_period / config.physics_period)
-        self._imu_steps = round(config.sensors.imu_period / config.physics_period)
-        self._latency = round(drawn.latency / config.physics_period)
-        self._bank = ServoBank(
-            BankConfig(
-                servo=robot.parameters.servo,
-                battery=robot.parameters.battery,
-                gain=drawn.servo_gain,
-                friction_scale=drawn.servo_friction,
-                open_voltage=drawn.voltage,
-                standby_current=config.standby_current,
-                backlash=_backlash(robot, config),
-                load_friction_speed=config.load_friction_speed,
-                period=config.physics_period,
-            ),
-            _plant(self._world),
-        )
-        self._ground = Ground(config.world, self._world.model, self._world.data)
-        self._truth = TruthReader(self._world, self._ground, self._bank, robot.parameters.legs.foot_radius)
-        windows = -(-self._steps // self._imu_steps)
-        self._inertial = InertialWindows(robot.parameters.sensors.imu, config.sensors.imu_period, windows)
-        self._samples = np.zeros((windows, SAMPLE))
-        probe = Probe(
-            means=self._inertial.values,
-            samples=self._samples,
-            position=self._bank.plant.position,
-            duty=self._bank.duty,
-            temperature=self._bank.temperature,
-            physics_period=config.physics_period,
-            frame_steps=self._steps,
-            window_steps=self._imu_steps,
-        )
-        self._sensors = Sensors(config.sensors, robot.parameters.servo, probe, seed)
-        world, data = self._world, self._world.data
-        self._sample = data.sensordata[world.sensor : world.sensor + SAMPLE]
-        self._pose, self._twist = data.qpos[world.q : world.q + 7], data.qvel[world.v : world.v + 6]
+        self._start = Posture(joints=robot.stance_joints, height=float(robot.default_stance()[2]))
         self._commands: deque[tuple[int, JointCommand]] = deque()
-        self._pushes: list[tuple[int, int, FloatArray]] = []
         self._frame = self.reset()
-
-    @property
-    def model(self) -> mujoco.MjModel:
-        """MuJoCo's model, for viewers."""
-        return self._world.model
-
-    @property
-    def data(self) -> mujoco.MjData:
-        """MuJoCo's state, for viewers. Do not write to it."""
-        return self._world.data
-
-    @property
-    def ground(self) -> Ground:
-        """Height of the ground anywhere."""
-        return self._ground
-
-    @property
-    def overheated(self) -> tuple[str, ...]:
-        """Names of the servos that switched off by heat."""
-        return self._bank.overheated
 
     def reset(self) -> SensorFrame:
         """Stand in the default stance at time zero: the state after construction, bit for bit."""
         self._commands.clear()
-        self._pushes = []
-        self._force = np.zeros(3)
         self.discarded_commands = 0
-        self._place()
-        self._bank.reset()
-        self._sensors.reset()
-        self._bank.hold(self._robot.stance_joints)
+        self._place(self._start)
+        self._bank.hold(self._start.joints)
         # Standing still is simulated before time zero, the last command period with sensors.
         settle = max(1, math.ceil(self.config.settle_time / self.config.command_period)) * self._steps
         self._step = -settle
         self._inertial.begin(self._pose, self._twist)
-        self._next_event = _NEVER
         while self._step < 0:
             self._bank.cool()
             self._frame = self._run_frame()
-        self._world.data.time = 0.0
-        self._bank.cool()
-        for push in self.config.pushes:
-            self._add_push(push.time, np.array(push.force), push.duration)
+        self._start_clock()
         return self._frame
 
     def step(self, command: JointCommand) -> SensorFrame:
@@ -155,115 +75,11 @@ class SimRobot:
     def close(self) -> None:
         """Nothing to give back; the memory goes with the object."""
 
-    def truth(self) -> TruthSample:
-        """The true state at the last frame: for reports, never for a controller."""
-        return self._truth.read(self._step * self.config.physics_period, self._force)
-
-    def apply_push(self, force: FloatArray, duration: float) -> None:
-        """Push the trunk's origin from now on.
-
-        Args:
-            force: (3,) N, world axes.
-            duration: s.
-        """
-        self._add_push(self._step * self.config.physics_period, np.asarray(force, dtype=np.float64), duration)
-
-    def _add_push(self, time: float, force: FloatArray, duration: float) -> None:
-        start = max(self._step, round(time / self.config.physics_period))
-        stop = start + max(1, round(duration / self.config.physics_period))
-        self._pushes.append((start, stop, force))
-        self._next_event = min(self._next_event, start)
-
-    def _place(self) -> None:
-        """Put the robot on the ground at the origin, aligned with the slope."""
-        world, model, data = self._world, self._world.model, self._world.data
-        mujoco.mj_resetData(model, data)
-        stance = self._robot.default_stance()
-        slope, height = self.config.world.slope, float(stance[2])
-        pose = data.qpos[world.q : world.q + 23]
-        pose[0:3] = (-math.sin(slope) * height, 0.0, math.cos(slope) * height)
-        pose[3:7] = (math.cos(0.5 * slope), 0.0, -math.sin(0.5 * slope), 0.0)
-        pose[7:] = stance[7:]
-
-    def _run_frame(self) -> SensorFrame:
-        """Physics of one command period, then what the sensors say of it."""
-        self._truth.start_frame()
-        first, count = self._advance()
-        if not math.isfinite(self._pose[2]):
-            now = self._step * self.config.physics_period
-            raise SimulationError(f"the simulation became unstable before t = {now:.3f} s")
-        self._truth.power, voltage = self._bank.finish_frame(self._steps)
-        self._inertial.means(count)
-        return self._sensors.measure(self._step, first, count, voltage)
-
-    def _advance(self) -> tuple[int, int]:
-        """The physics steps of one frame.
-
-        Gyro and accelerometer give means over the IMU's period. The other
-        sensors are evaluated in the steps that end on it, so their samples are
-        one physics step old.
-
-        Returns:
-            Number of the step that ends with the first sample, and of samples.
-        """
-        model, data = self._world.model, self._world.data
-        option, advance, mj_step = model.opt, self._bank.advance, mujoco.mj_step
-        flags = option.disableflags & ~_SENSORS_OFF
-        quiet = flags | _SENSORS_OFF
-        option.disableflags = quiet
-        period, count = self._imu_steps, 0
-        for step in range(self._step + 1, self._step + self._steps + 1):
-            if step > self._next_event:
-                self._handle_events(step - 1)
-            advance()
-            if step % period:
-                mj_step(model, data)
-                continue
-            option.disableflags = flags
-            mj_step(model, data)
-            option.disableflags = quiet
-            self._inertial.mark(count, self._pose, self._twist)
-            self._samples[count] = self._sample
-            self._truth.look_for_contacts()
-            count += 1
-        first = self._step // period * period + period
-        self._step += self._steps
-        return first, count
-
     def _handle_events(self, step: int) -> None:
         """Deliver the commands that have arrived and switch pushes on and off."""
         commands = self._commands
         while commands and commands[0][0] <= step:
             self._bank.write(commands.popleft()[1])
-        self._next_event = commands[0][0] if commands else _NEVER
+        self._next_event = commands[0][0] if commands else NEVER
         if self._pushes:
             self._next_event = min(self._next_event, self._push(step))
-
-    def _push(self, step: int) -> int:
-        """Bring the pushes of a step into force; returns the step at which they change next."""
-        self._pushes = [push for push in self._pushes if step < push[1]]
-        self._force = np.zeros(3)
-        for start, _, force in self._pushes:
-            if start <= step:
-                self._force += force
-        # The free joint's first three forces act on the trunk's origin, in world axes.
-        v = self._world.v
-        self._world.data.qfrc_applied[v : v + 3] = self._force
-        return min((edge for push in self._pushes for edge in push[:2] if edge > step), default=_NEVER)
-
-
-def _backlash(robot: RobotModel, config: SimConfig) -> float:
-    degrees = robot.parameters.servo.backlash_deg if config.backlash_deg is None else config.backlash_deg
-    return math.radians(degrees)
-
-
-def _plant(world: World) -> Plant:
-    data, model = world.data, world.model
-    q, v = world.q + 7, world.v + 6
-    return Plant(
-        position=data.qpos[q : q + N_JOINTS],
-        speed=data.qvel[v : v + N_JOINTS],
-        drive=data.ctrl[world.ctrl : world.ctrl + N_JOINTS],
-        friction=model.dof_frictionloss[v : v + N_JOINTS],
-        damping=model.dof_damping[v : v + N_JOINTS],
-    )

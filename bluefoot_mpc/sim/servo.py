@@ -18,12 +18,17 @@ import casadi as ca
 import numpy as np
 
 from bluefoot_mpc.codegen import compiled, made_once
+from bluefoot_mpc.io.emulation.shafts import MIDDLE, ShaftDrive
 from bluefoot_mpc.model import servo as law
 from bluefoot_mpc.model.parameters import BatteryParameters, ServoParameters
 from bluefoot_mpc.types import JOINTS, N_JOINTS, BoolArray, FloatArray, JointCommand
 
 _NO_RAMP = 1e6
 """Counts a step: a goal ramp that never holds back."""
+_FOR_EVER = 1e6
+"""Counts: a goal that a wheel never reaches."""
+_CLOCKWISE = 1 << 10
+"""Bit of the moving-speed register that turns a wheel clockwise."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -108,6 +113,7 @@ class ServoBank:
         for state in (self.goal, self.profile, self.play, self.duty, self.torque, self._wanted_limit):
             state[:] = 0.0
         self._ramp[:] = _NO_RAMP
+        self._slope[:] = self.config.gain / self.config.servo.compliance_slope
         self._live[:] = 0.0
         self._shut_down[:] = False
         self._asked_limit = [0.0] * N_JOINTS
@@ -143,6 +149,23 @@ class ServoBank:
         # A servo works again only when it has cooled and its limit is written anew.
         self._shut_down &= self.temperature >= law.SHUTDOWN_TEMPERATURE
         self._apply_limits()
+
+    def write_servo(self, index: int, drive: ShaftDrive) -> None:
+        """Let the registers of one servo act; margin and punch are those of the parameter file."""
+        servo, limit = self.config.servo, drive.torque_limit / law.FULL_DUTY
+        self.goal[index] = drive.goal - MIDDLE
+        ramp = drive.speed * (law.SPEED_UNIT * self.config.period / servo.step_angle)
+        if drive.is_wheel:
+            self.goal[index] = -_FOR_EVER if drive.speed & _CLOCKWISE else _FOR_EVER
+            limit, ramp = min(limit, (drive.speed & (_CLOCKWISE - 1)) / law.FULL_DUTY), 0.0
+        self._ramp[index] = ramp or _NO_RAMP
+        self._slope[index] = self.config.gain[index] * 2.0 / sum(drive.slope)
+        limit = limit if drive.enabled else 0.0
+        if limit != self._wanted_limit[index] or self._shut_down[index]:
+            self._asked_limit = []
+            self._wanted_limit[index] = limit
+            self._shut_down[index] &= self.temperature[index] >= law.SHUTDOWN_TEMPERATURE
+            self._apply_limits()
 
     @property
     def overheated(self) -> tuple[str, ...]:

@@ -9,6 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+MIDDLE = 512
+"""Position count of the middle of a servo's range."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ShaftDrive:
