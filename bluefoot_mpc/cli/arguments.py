@@ -72,18 +72,41 @@ class SimulationArguments(Common):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunCommand(SimulationArguments):
-    """Run a scenario and write its log, summary and report."""
+class RobotArguments(SimulationArguments):
+    """What every run on some robot takes."""
 
-    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO", help_behavior_hint="")]
-    """Name of a scenario (see: bluefoot list), or path of a scenario script."""
-    robot: Annotated[str, tyro.conf.arg(metavar="{sim}")] = "sim"
-    """What to run on."""
+    robot: Annotated[str, tyro.conf.arg(metavar="{sim,emulator,hardware}")] = "sim"
+    """What to run on: the simulator, emulated devices with the simulator behind them, or the robot."""
+    port: Annotated[
+        tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="PATH", help_behavior_hint="")
+    ] = ()
+    """Hardware: serial port of the servos; again for each further one."""
+    baud: Annotated[int | None, tyro.conf.arg(help_behavior_hint="(default: 1000000)")] = None
+    """Hardware: rate of the servos' bus, bit/s."""
+    link: Annotated[
+        str | None, tyro.conf.arg(metavar="{memory,pty}", help_behavior_hint="(default: memory)")
+    ] = None
+    """Emulator: in memory on a virtual clock, or over pseudo-terminals in real time."""
+    station: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS", help_behavior_hint="")] = None
+    """Address of a ground station, e.g. udp:127.0.0.1:14550 or serial:/dev/ttyUSB1:57600."""
     controller: Annotated[
         str | None,
         tyro.conf.arg(metavar="{cpg,mpc}", help_behavior_hint=f"(default: {DEFAULT_CONTROLLER}; level: cpg)"),
     ] = None
     """What decides."""
+
+    def run_fields(self) -> dict[str, Any]:
+        """Arguments by the names that RunOptions gives them."""
+        names = ("robot", "port", "baud", "link", "station", "controller")
+        return {**super().run_fields(), **{name: getattr(self, name) for name in names}}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunCommand(RobotArguments):
+    """Run a scenario and write its log, summary and report."""
+
+    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO", help_behavior_hint="")]
+    """Name of a scenario (see: bluefoot list), or path of a scenario script."""
     duration: Annotated[float | None, _Unset] = None
     """Length of the run, s."""
     view: bool = False
@@ -111,7 +134,7 @@ class RunCommand(SimulationArguments):
 
     def run_fields(self) -> dict[str, Any]:
         """Arguments by the names that RunOptions gives them."""
-        names = ["robot", "controller", "duration", "view", "speed", "lateral_speed"]
+        names = ["duration", "view", "speed", "lateral_speed"]
         names += ["yaw_rate", "impulse", "direction", "push_time", "level", "level_mix"]
         return {**super().run_fields(), **{name: getattr(self, name) for name in names}}
 
@@ -184,8 +207,8 @@ class PowerCommand(ModelArguments):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DriveCommand(SimulationArguments):
-    """Drive the simulated robot from the keyboard, or a gamepad."""
+class DriveCommand(RobotArguments):
+    """Drive a robot from the keyboard, or a gamepad."""
 
     no_view: bool = False
     """Do not show the robot in a browser."""

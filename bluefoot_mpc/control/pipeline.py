@@ -115,6 +115,16 @@ class Pipeline:
         """What the levelling network has learnt; None without one."""
         return None if self._level is None else self._level.compensator.source.weights
 
+    @property
+    def sitting(self) -> PostureReference:
+        """Trunk and feet of the sitting posture, over the nominal stance."""
+        return self._trunk.over_stance(np.zeros(6), sit_level=1.0)
+
+    @property
+    def sitting_joints(self) -> FloatArray:
+        """(16,) rad, joints of the sitting posture."""
+        return self._targets.reach(self.sitting).joints
+
     def step(
         self, frame: SensorFrame, motion: MotionCommand, safety: SafetyRequest | None = None
     ) -> ControlOutput:

@@ -113,7 +113,7 @@ class TrunkPlanner:
             self._centring.step(tilt, gait, dt)
             self._trim = posture.trim_level(self._trim, tilt, style.level_gain, config.level_bound, dt)
         zmp = self._sway.step(gait, stand.joints, self.position, dt)
-        height = style.trunk_height * (1.0 - stand.sit_level * (1.0 - config.sit_height_share))
+        height = self._height(style.trunk_height, stand.sit_level)
         before = self._pose
         events = self._follow(gait, motion, height, dt)
         self._tell_sway(moved=self._pose is not before)
@@ -132,15 +132,19 @@ class TrunkPlanner:
             self._sway.follow(told)
             self._told = told
 
-    def over_stance(self, pose: FloatArray) -> PostureReference:
-        """The reference of a (6,) commanded offset over the nominal stance."""
+    def over_stance(self, pose: FloatArray, sit_level: float = 0.0) -> PostureReference:
+        """The reference of a (6,) commanded offset over the nominal stance; `sit_level` 1 sits."""
         x, y, z = pose[:3].tolist()
+        height = self._height(self._stance.trunk_height, sit_level)
         return PostureReference(
-            trunk_position=np.array([x + self._config.trunk_forward, y, z + self._stance.trunk_height]),
+            trunk_position=np.array([x + self._config.trunk_forward, y, z + height]),
             trunk_rpy=pose[3:],
             foot_position=self._stance.feet,
             swing=_PLANTED,
         )
+
+    def _height(self, standing: float, sit_level: float) -> float:
+        return standing * (1.0 - sit_level * (1.0 - self._config.sit_height_share))
 
     def _joints_in_stance(self, pose: FloatArray) -> FloatArray:
         return self._reach(self.over_stance(pose)).joints

@@ -9,11 +9,15 @@ from pathlib import Path
 from bluefoot_mpc.control.names import CONTROLLERS
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 
-ROBOTS = ("sim",)
+ROBOTS = ("sim", "emulator", "hardware")
+LINKS = ("memory", "pty")
+"""How an emulated robot is reached: in this process on a virtual clock, or in real time over terminals."""
 RANDOMIZATIONS = ("none", "standard")
 GAITS = ("trot", "walk")
 LEVELS = ("none", "pd", "narx")
 """No levelling, attitude feedback alone, and with the disturbance that the network predicts."""
+MIN_BAUD, MAX_BAUD = 7843, 1_000_000
+"""bit/s, what register 4 of an AX-12A can choose."""
 MAX_SEED = 2**63 - 1
 """Largest whole number that TOML and the log can hold."""
 
@@ -28,6 +32,10 @@ class RunOptions:
     """
 
     robot: str = "sim"
+    port: tuple[str, ...] = ()  # serial ports of the servos, for hardware
+    baud: int | None = None  # bit/s of the servos' bus
+    link: str | None = None  # one of LINKS, for the emulator
+    station: str | None = None  # address of a ground station
     controller: str | None = None  # None: what the configuration file says, or the default
     model: str | None = None  # parameter file, or the name of one that ships
     seed: int = 0
@@ -54,6 +62,7 @@ class RunOptions:
 
     def __post_init__(self) -> None:
         _require_choice("robot", self.robot, ROBOTS)
+        self._check_devices()
         if self.controller is not None:
             _require_choice("controller", self.controller, CONTROLLERS)
         _require_choice("randomization", self.randomize, RANDOMIZATIONS)
@@ -77,6 +86,17 @@ class RunOptions:
             raise ConfigurationError(f"--push-time = {self.push_time} must not be negative (seconds)")
         if not 0 <= self.seed <= MAX_SEED:
             raise ConfigurationError(f"--seed = {self.seed} must lie in 0..{MAX_SEED}")
+
+    def _check_devices(self) -> None:
+        """Options of devices fit the robot that has them."""
+        if self.link is not None:
+            _require_choice("link", self.link, LINKS)
+        if self.link is not None and self.robot != "emulator":
+            raise ConfigurationError("--link is for --robot emulator; real servos are reached by --port")
+        if (self.port or self.baud is not None) and self.robot != "hardware":
+            raise ConfigurationError("--port and --baud are for --robot hardware; an emulator brings its own")
+        if self.baud is not None and not MIN_BAUD <= self.baud <= MAX_BAUD:
+            raise ConfigurationError(f"--baud = {self.baud} must lie in {MIN_BAUD}..{MAX_BAUD}")
 
 
 def _require_choice(kind: str, value: str, valid: tuple[str, ...]) -> None:
