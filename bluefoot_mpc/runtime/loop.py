@@ -1,8 +1,8 @@
 """The control loop, the same for every robot: frame in, command out, nothing lost.
 
 Whatever goes wrong in a tick, the robot sinks under torque before it is made
-limp, and what was recorded stays. A run that simply ends leaves the robot limp
-at once: a scenario that wants it seated commands that before it is over.
+limp, and what was recorded stays. A run that ends lets a robot with power end
+its gait and sit down before it goes limp; a simulation simply ends.
 """
 
 from __future__ import annotations
@@ -74,11 +74,13 @@ class LoopHooks:
         recorder: writes the log.
         truth: the simulator's truth, for the record only.
         observers: called after every tick (live view, progress).
+        rests: the robot sits down at the end of a run, as it does when one is cut short.
     """
 
     recorder: Recorder | None = None
     truth: Callable[[], TruthSample] | None = None
     observers: tuple[Observer, ...] = ()
+    rests: bool = False
 
 
 def run_loop(
@@ -133,6 +135,8 @@ def _ticks(
             cut_short = INTERRUPTED
         elif cut_short is None:
             motion, cut_short = _ask(source, now)
+            if motion is None and hooks.rests:
+                motion, cut_short = _REST, COMPLETED
         if cut_short is not None:
             resting_since = min(resting_since, now)
         if motion is None:

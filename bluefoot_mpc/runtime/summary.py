@@ -93,14 +93,15 @@ def summarize(
 def fell(run: RunData) -> bool:
     """True when something other than the feet touched the world, or the trunk tilted over 45°.
 
-    A trunk that rests on the floor by command (off, sitting, and on the way up
-    from there) has not fallen. Without a simulator the estimated tilt decides.
+    A trunk that rests on the floor at the start or by command (off, sitting, and
+    on the way up from there) has not fallen. Without a simulator the estimated
+    tilt decides.
     """
     if not run.truth:
         return any(metrics.tilt(t.estimate.quaternion[None])[0] > FALL_TILT for t in run.telemetry)
     if bool((metrics.tilt(run.stack("truth", "q")[:, 3:7]) > FALL_TILT).any()):
         return True
-    stands = True
+    stands = not run.truth[0].touching
     for k, sample in enumerate(run.truth):
         mode = run.telemetry[min(k, len(run.telemetry) - 1)].mode if run.telemetry else Mode.STAND
         if mode in (Mode.OFF, Mode.SIT):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from bluefoot_mpc.runtime import metrics
-from bluefoot_mpc.runtime.data import COMPLETED, CommandRecord, RunData
+from bluefoot_mpc.runtime.data import CommandRecord, RunData
 from bluefoot_mpc.types import BoolArray, FloatArray, Mode, MotionCommand, Telemetry, TruthSample
 
 SETTLING = 2.0
@@ -24,7 +24,7 @@ def measurement_window(run: RunData) -> tuple[float, float]:
     """Start and end (s, time of the frames): from 2 s after the last change of command to the end.
 
     Start lies behind the end where the command changes until too late. The
-    coming to rest of a run that was cut short does not count.
+    coming to rest at the end of a run does not count.
     """
     commands = wanted_commands(run)
     if not commands:
@@ -37,11 +37,10 @@ def measurement_window(run: RunData) -> tuple[float, float]:
 
 
 def wanted_commands(run: RunData) -> Sequence[CommandRecord]:
-    """What was commanded, without the order to rest that ends a run which is cut short."""
+    """What was commanded, without the order to rest at the end."""
     end = len(run.commands)
-    if run.stop_reason != COMPLETED:
-        while end and run.commands[end - 1].motion.mode is Mode.OFF:
-            end -= 1
+    while end and run.commands[end - 1].motion.mode is Mode.OFF:
+        end -= 1
     return run.commands[:end] or run.commands
 
 

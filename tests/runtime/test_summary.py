@@ -107,14 +107,14 @@ def test_window_starts_two_seconds_after_the_last_change() -> None:
     assert summarize(run)["figures"]["window_s"] == [start, end]
 
 
-def test_the_rest_of_an_interrupted_run_is_not_measured() -> None:
+@pytest.mark.parametrize("reason", ["completed", "interrupted"])
+def test_the_rest_at_the_end_of_a_run_is_not_measured(reason: str) -> None:
     run = scripted_walk()
     whole = summarize(run)
     resting = MotionCommand(mode=Mode.OFF)
     last = len(run.commands) - 50
     run.commands[last:] = [replace(record, motion=resting) for record in run.commands[last:]]
-    assert summarize(run)["figures"]["window_s"] is None  # a command like any other
-    run.stop_reason = "interrupted"
+    run.stop_reason = reason
     cut_short = summarize(run)
     assert cut_short["figures"]["window_s"][1] == run.commands[last - 1].time
     assert (cut_short["gait"], cut_short["speed_ref_mps"]) == ("trot", SPEED)
