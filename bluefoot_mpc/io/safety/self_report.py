@@ -1,0 +1,60 @@
+"""What follows from a powered robot's own account of its health."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bluefoot_mpc.io.findings import Severity
+from bluefoot_mpc.io.safety.faults import Fault, Response
+from bluefoot_mpc.io.safety.health import Health
+from bluefoot_mpc.types import JOINTS, N_JOINTS, BoolArray
+
+
+class HealthMonitor:
+    """Judges the robot's own account.
+
+    Attributes:
+        dead: (16,) servos that must not get torque back before the robot is armed anew.
+    """
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget every fault."""
+        self.dead: BoolArray = np.zeros(N_JOINTS, dtype=bool)
+
+    def step(self, health: Health) -> list[Fault]:
+        """Judge an account."""
+        faults = [
+            *self._lost(health.shut_down, "has switched itself off (overload or overheating)", "Let it cool"),
+            *self._lost(health.restarted, "lost its power and came back without torque", "Check its plug"),
+        ]
+        if health.power_on is False:
+            text = "the power board has switched the servos off. Check its switch and fuse, then arm anew"
+            faults.append(Fault(key="power", response=Response.EMERGENCY, text=text))
+        if health.silent:
+            text = f"no reply from {_names(health.silent)}. Check the plugs"
+            faults.append(Fault(key=f"gone {health.silent[0]}", response=Response.SIT, text=text))
+        if health.watched is False:
+            text = "the watchdog beside the robot's program is gone. Sit the robot down and start anew"
+            faults.append(Fault(key="watchdog", response=Response.SIT, text=text))
+        for finding in health.findings:
+            if finding.severity >= Severity.WARNING:
+                refused = finding.severity is Severity.REFUSAL
+                response = Response.SIT if refused else Response.WARN
+                key = f"{finding.part} {response.name}"
+                faults.append(Fault(key=key, response=response, text=str(finding)))
+        return faults
+
+    def _lost(self, joints: tuple[int, ...], what: str, mend: str) -> list[Fault]:
+        faults = []
+        for joint in joints:
+            self.dead[joint] = True
+            text = f"servo {JOINTS[joint]} {what}: it stays off. {mend}, then arm anew"
+            faults.append(Fault(key=f"{what} {joint}", response=Response.STOP, text=text))
+        return faults
+
+
+def _names(joints: tuple[int, ...]) -> str:
+    return ", ".join(JOINTS[joint] for joint in joints)
