@@ -32,17 +32,41 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from bluefoot_mpc.io.emulation.ax12a_table import CELLS, EEPROM_SIZE, FACTORY, SLOPES, TABLE_SIZE, Cell
+from bluefoot_mpc.io.dynamixel.table import Register
+from bluefoot_mpc.io.emulation.ax12a_table import (
+    BAUD,
+    CCW_LIMIT,
+    CELLS,
+    CW_LIMIT,
+    EEPROM_SIZE,
+    FACTORY,
+    GOAL,
+    ID,
+    LOCK,
+    MARGIN,
+    MAX_TORQUE,
+    MAX_VOLTAGE,
+    MIN_VOLTAGE,
+    MOVING,
+    POSITION,
+    PUNCH,
+    REGISTERED,
+    SHUTDOWN,
+    SLOPE,
+    SLOPES,
+    SPEED,
+    STATUS_LEVEL,
+    TABLE_SIZE,
+    TEMPERATURE_LIMIT,
+    TORQUE_ENABLE,
+    TORQUE_LIMIT,
+    is_writable,
+)
 from bluefoot_mpc.io.emulation.shafts import ShaftDrive, Shafts
 from bluefoot_mpc.model.servo import SPEED_UNIT
 
 BROADCAST = 254
 """ID that every servo obeys and none answers."""
-
-ID, BAUD, RETURN_DELAY, CW_LIMIT, CCW_LIMIT = 3, 4, 5, 6, 8
-TEMPERATURE_LIMIT, MIN_VOLTAGE, MAX_VOLTAGE, MAX_TORQUE, STATUS_LEVEL, SHUTDOWN = 11, 12, 13, 14, 16, 18
-TORQUE_ENABLE, MARGIN, SLOPE, GOAL, SPEED, TORQUE_LIMIT = 24, 26, 28, 30, 32, 34
-POSITION, REGISTERED, MOVING, LOCK, PUNCH = 36, 44, 46, 47, 48
 
 VOLTAGE, ANGLE_LIMIT, OVERHEATING, RANGE, CHECKSUM, OVERLOAD, INSTRUCTION = (1 << bit for bit in range(7))
 """Error bits of a status packet."""
@@ -171,6 +195,7 @@ class EmulatedServo:
             self.sense(time)
             error, answer = self._read(data)
         elif instruction == WRITE:
+            self.sense(time)
             error = self.store(data[0], data[1:], time) if len(data) > 1 else INSTRUCTION
         elif instruction == PING:
             self.sense(time)
@@ -197,8 +222,8 @@ class EmulatedServo:
 
     def store(self, address: int, data: bytes, time: float) -> int:
         """Write registers, or nothing; returns error bits."""
-        # What was measured last decides about a shutdown; here it must be new.
-        self.sense(time)
+        if self._state_error:  # whose cause may be gone
+            self.sense(time)
         error = self._refusal(address, data)
         if error:
             return error
@@ -305,9 +330,9 @@ class EmulatedServo:
             position = cell.address + cell.size
         return error
 
-    def _refusal_of(self, cell: Cell, position: int, data: bytes) -> int:
+    def _refusal_of(self, cell: Register, position: int, data: bytes) -> int:
         """Error bits of a write to one register, or to the part of it that `data` covers."""
-        if not cell.is_writable:
+        if not is_writable(cell):
             return RANGE
         offset = position - cell.address
         given = data[: cell.size - offset]

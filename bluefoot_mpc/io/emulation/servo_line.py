@@ -25,10 +25,10 @@ from bluefoot_mpc.io.emulation.ax12a import (
     CHECKSUM,
     PING,
     READ,
-    RETURN_DELAY,
     SYNC_WRITE,
     EmulatedServo,
 )
+from bluefoot_mpc.io.emulation.ax12a_table import RETURN_DELAY
 from bluefoot_mpc.io.emulation.shafts import Shafts
 
 RECEIVE_BUFFER = 143
