@@ -8,6 +8,7 @@ stall torque; on a bench with a known weight the weight's moment enters the fit.
 from __future__ import annotations
 
 import contextlib
+import importlib
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -233,8 +234,8 @@ def _fitted(records: Sequence[StepRecord], bench: Bench, iterations: int, start:
 
 def _sysid() -> Any:
     """`mujoco.sysid`, whose own dependencies are optional parts of MuJoCo."""
-    from mujoco import sysid  # noqa: PLC0415
-
+    # Its type marker makes checkers take MuJoCo for nothing but this package: imported by name.
+    sysid: Any = importlib.import_module("mujoco.sysid")
     if not hasattr(sysid, "optimize"):
         raise ConfigurationError(
             "mujoco.sysid lacks what it needs: install the packages absl-py, colorama, tabulate and pyyaml"
