@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 FALL_TILT = math.radians(45.0)
 """Tilt that counts as a fall, rad."""
+_UP = 0.3
+"""s that nothing but feet must touch the floor until a robot that lay or sat counts as standing."""
 MIN_DISTANCE = 0.05
 """m that must be covered before a cost of transport means anything."""
 
@@ -101,16 +103,20 @@ def fell(run: RunData) -> bool:
         return any(metrics.tilt(t.estimate.quaternion[None])[0] > FALL_TILT for t in run.telemetry)
     if bool((metrics.tilt(run.stack("truth", "q")[:, 3:7]) > FALL_TILT).any()):
         return True
-    stands = not run.truth[0].touching
+    # Emulated servos find the robot lying; a simulated one starts on its feet.
+    stands = run.config.get("run", {}).get("robot", "sim") == "sim"
+    has_stood, free_since = stands, math.inf
     for k, sample in enumerate(run.truth):
         mode = run.telemetry[min(k, len(run.telemetry) - 1)].mode if run.telemetry else Mode.STAND
+        free_since = math.inf if sample.touching else min(free_since, sample.time)
         if mode in (Mode.OFF, Mode.SIT):
             stands = False
-        elif not sample.touching:
-            stands = True
-        elif stands:
+        elif not stands:
+            stands = sample.time - free_since >= _UP
+        elif sample.touching:
             return True
-    return False
+        has_stood |= stands
+    return not has_stood
 
 
 def duration(run: RunData) -> float:
