@@ -58,7 +58,7 @@ ERROR_WORDS: Mapping[ErrorBit, str] = {
     ErrorBit.RANGE: "an instruction's parameter was out of range",
     ErrorBit.CHECKSUM: "an instruction reached it with a bad checksum",
     ErrorBit.OVERLOAD: "its load is more than it can hold",
-    ErrorBit.INSTRUCTION: "it was sent an instruction that it does not know, or an action with nothing registered",
+    ErrorBit.INSTRUCTION: "it was sent an instruction that it does not know, or an action without a write",
 }
 
 

@@ -50,18 +50,18 @@ class CorruptReplyError(ServoError):
 
 
 class ServoFaultError(ServoError):
-    """A servo answered that it would not do what it was told.
+    """A servo answered that it would not do what it was told, or did not do it.
 
     Attributes:
         error: `ErrorBit`s of its answer.
     """
 
-    def __init__(self, servo: int, port: str, error: int) -> None:
+    def __init__(self, servo: int, port: str, error: int, what: str = "") -> None:
         self.error = error
         super().__init__(
             servo,
             port,
-            f"it refused: {error_words(error)}",
+            what or f"it refused: {error_words(error)}",
             "Check the value against the control table of an AX-12A, and that it is one",
         )
 

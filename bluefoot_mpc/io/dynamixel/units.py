@@ -57,7 +57,7 @@ def register_from_speed(speed: float) -> int:
 
 
 def load_from_register(value: int) -> float:
-    """Present load as a fraction of full duty, counter-clockwise positive; the servo infers, not measures it."""
+    """Present load, fraction of full duty, counter-clockwise positive; the servo infers it from its duty."""
     return signed(value) / FULL_DUTY
 
 

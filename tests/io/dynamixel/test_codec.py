@@ -94,7 +94,7 @@ def test_a_packet_in_any_pieces(servo, error, parameters, data):
             st.tuples(
                 st.just(True), st.builds(status_packet, st.integers(0, 253), st.integers(0, 127), bodies)
             ),
-            # Without FF no false header begins in the garbage and takes a good packet's beginning for its own.
+            # Without FF no false header in the garbage can take a good packet's beginning for its own.
             st.tuples(
                 st.just(False), st.binary(max_size=20).map(lambda data: data.replace(b"\xff", b"\x00"))
             ),
