@@ -23,6 +23,7 @@ class CommandGate:
 
     Attributes:
         last: what was let through last, before any ceiling of the torque limits; None before the first.
+        complaint: what was so wrong with the last command that people should know; mostly None.
 
     Args:
         lower: (16,) rad, lowest goal that may be sent.
@@ -37,6 +38,7 @@ class CommandGate:
     def reset(self) -> None:
         """Forget what was sent and where the joints are."""
         self.last: JointCommand | None = None
+        self.complaint: Fault | None = None
         self.position = np.full(N_JOINTS, np.nan)
 
     def locate(self, frame: SensorFrame) -> None:
@@ -49,28 +51,11 @@ class CommandGate:
         reference = self._reference(command)
         goal = clip(command.position, reference - self._reach, reference + self._reach)
         goal = clip(goal, self._lower, self._upper)
+        moved = self.last is not None and not (goal == command.position).all()
+        self.complaint = self._complaint(command.position, reference) if moved else None
         limit = clip(command.torque_limit, 0.0, 1.0)
         self.last = JointCommand(position=goal, speed=np.maximum(command.speed, 0.0), torque_limit=limit)
         return self.last
-
-    def complaint(self, command: JointCommand) -> Fault | None:
-        """What is so wrong with a finite command that people should know."""
-        wanted = command.position
-        if self.last is None or wanted is self.last.position:
-            return None
-        jump = np.abs(wanted - self.last.position)
-        if float(jump.max()) > JUMP:
-            joint = int(jump.argmax())
-            text = f"the goal of {JOINTS[joint]} jumped by {jump[joint]:.2f} rad: it moves there slowly"
-            return Fault(key="jump", response=Response.WARN, text=f"{text}. Check the controller")
-        beyond = np.maximum(wanted - self._upper, self._lower - wanted)
-        if float(beyond.max()) > BEYOND:
-            joint = int(beyond.argmax())
-            text = (
-                f"the goal of {JOINTS[joint]} was {beyond[joint]:.2f} rad outside its limits: it stops there"
-            )
-            return Fault(key="beyond", response=Response.WARN, text=f"{text}. Check the controller")
-        return None
 
     def held(self) -> JointCommand:
         """What is sent instead of a command that cannot be: the last one, at first where the joints are."""
@@ -83,6 +68,21 @@ class CommandGate:
             # A servo that is somewhere unknown stays limp: to hold it would be to move it.
             torque_limit=np.where(unknown, 0.0, 1.0),
         )
+
+    def _complaint(self, wanted: FloatArray, reference: FloatArray) -> Fault | None:
+        jump = np.abs(wanted - reference)
+        if float(jump.max()) > JUMP:
+            joint = int(jump.argmax())
+            text = f"the goal of {JOINTS[joint]} jumped by {jump[joint]:.2f} rad: it moves there slowly"
+            return Fault(key="jump", response=Response.WARN, text=f"{text}. Check the controller")
+        beyond = np.maximum(wanted - self._upper, self._lower - wanted)
+        if float(beyond.max()) > BEYOND:
+            joint = int(beyond.argmax())
+            text = (
+                f"the goal of {JOINTS[joint]} was {beyond[joint]:.2f} rad outside its limits: it stops there"
+            )
+            return Fault(key="beyond", response=Response.WARN, text=f"{text}. Check the controller")
+        return None
 
     def _reference(self, command: JointCommand) -> FloatArray:
         """(16,) rad, where goals are limited from: the last ones, at first where the joints are."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from bluefoot_mpc.io.findings import Finding
+from bluefoot_mpc.io.safety.guard import GuardState
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -18,8 +19,10 @@ class Health:
             own torque off and would come back only by a new torque limit.
         restarted: joints whose servo lost its power and came back, with its registers at their
             defaults and its torque off. They stay listed until the robot is armed anew.
-        silent: joints whose servo has not answered for longer than the bus tolerates.
-        watched: False when the watchdog process, or the guard's thread, is gone; None without one.
+        silent: joints whose servo does not answer as it should: people are told, and the supervisor
+            counts for itself when it has been too long.
+        guard: what the guard on the bus thread does; None without one.
+        watched: False when the watchdog process is gone; None without one.
         findings: anything else that people should know; those that refuse make the robot sit down.
     """
 
@@ -27,6 +30,7 @@ class Health:
     shut_down: tuple[int, ...] = ()
     restarted: tuple[int, ...] = ()
     silent: tuple[int, ...] = ()
+    guard: GuardState | None = None
     watched: bool | None = None
     findings: tuple[Finding, ...] = ()
 

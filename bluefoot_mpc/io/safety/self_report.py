@@ -6,6 +6,7 @@ import numpy as np
 
 from bluefoot_mpc.io.findings import Severity
 from bluefoot_mpc.io.safety.faults import Fault, Response
+from bluefoot_mpc.io.safety.guard import GuardState
 from bluefoot_mpc.io.safety.health import Health
 from bluefoot_mpc.types import JOINTS, N_JOINTS, BoolArray
 
@@ -33,9 +34,11 @@ class HealthMonitor:
         if health.power_on is False:
             text = "the power board has switched the servos off. Check its switch and fuse, then arm anew"
             faults.append(Fault(key="power", response=Response.EMERGENCY, text=text))
-        if health.silent:
-            text = f"no reply from {_names(health.silent)}. Check the plugs"
-            faults.append(Fault(key=f"gone {health.silent[0]}", response=Response.SIT, text=text))
+        if health.guard in _GUARDED:
+            faults.append(Fault(key=f"guard {health.guard}", response=_GUARDED[health.guard], text=_AWAY))
+        for joint in health.silent:
+            text = f"servo {JOINTS[joint]} does not answer as it should. Check its plug"
+            faults.append(Fault(key=f"silent servo {joint}", response=Response.WARN, text=text))
         if health.watched is False:
             text = "the watchdog beside the robot's program is gone. Sit the robot down and start anew"
             faults.append(Fault(key="watchdog", response=Response.SIT, text=text))
@@ -56,5 +59,8 @@ class HealthMonitor:
         return faults
 
 
-def _names(joints: tuple[int, ...]) -> str:
-    return ", ".join(JOINTS[joint] for joint in joints)
+_GUARDED = {GuardState.SINK: Response.STOP, GuardState.OFF: Response.EMERGENCY}
+_AWAY = (
+    "the control thread was away for too long: the guard below it lowers the robot and switches it off. "
+    "Look for what keeps the machine busy"
+)

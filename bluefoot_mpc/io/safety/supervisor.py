@@ -136,10 +136,10 @@ class SafetySupervisor:
             self._unusable += self.period
             return self._capped(self._gate.held())
         self._unusable = 0.0
-        complaint = self._gate.complaint(command)
-        if complaint is not None:
-            self._book.note(complaint)
-        return self._capped(self._gate.passed(command))
+        passed = self._gate.passed(command)
+        if self._gate.complaint is not None:
+            self._book.note(self._gate.complaint)
+        return self._capped(passed)
 
     def emergency(self, reason: str) -> None:
         """Torque off and power cut at once, from any thread, in any state, as often as wanted.
@@ -193,14 +193,19 @@ class SafetySupervisor:
     def _watch(self, frame: SensorFrame) -> None:
         if self._gate.last is None:
             self._gate.locate(frame)
-        faults = self._monitors.step(frame, self._watched.health() if self._watched is not None else None)
-        for fault in faults:
-            if fault.response is Response.EMERGENCY and not self.stopped:
-                self.emergency(fault.text)
+        if self._powered is None or not self.stopped:
+            # A robot that was switched off on purpose has no voltage, and no servo answers.
+            self._judge(frame)
         if self._emergency:
             text = f"emergency stop: {self._emergency}"
             self._book.note(Fault(key="emergency", response=Response.EMERGENCY, text=text))
-        self._book.take(faults)
+
+    def _judge(self, frame: SensorFrame) -> None:
+        faults = self._monitors.step(frame, self._watched.health() if self._watched is not None else None)
+        self._book.take(fault for fault in faults if fault.response is not Response.EMERGENCY)
+        for fault in faults:
+            if fault.response is Response.EMERGENCY:
+                self.emergency(fault.text)
 
     def _advance(self, inputs: Inputs) -> None:
         before = self._machine.state
