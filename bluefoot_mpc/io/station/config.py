@@ -40,6 +40,7 @@ class StationConfig:
     up_share: float = 0.16  # of the line that the station may use
     burst: int = 240  # bytes that may leave at once
     heartbeat_timeout: float = 2.5  # s without a heartbeat until commands begin to age whatever else comes
+    steer_timeout: float = 0.5  # s without a word from whoever holds the sticks until they are centred
     recall_after: float = 1.0  # s of silence after which a walking command has to be given anew
     sequence_window: int = 32  # messages that may be lost in a row before a number counts as an old one
     sequence_timeout: float = 1.0  # s of silence after which any number is taken
@@ -51,8 +52,8 @@ class StationConfig:
         require_range(1, 127, sequence_window=self.sequence_window)
         require_positive(
             line_rate=self.line_rate, down_share=self.down_share, up_share=self.up_share, burst=self.burst,
-            heartbeat_timeout=self.heartbeat_timeout, recall_after=self.recall_after,
-            sequence_timeout=self.sequence_timeout,
+            heartbeat_timeout=self.heartbeat_timeout, steer_timeout=self.steer_timeout,
+            recall_after=self.recall_after, sequence_timeout=self.sequence_timeout,
         )  # fmt: skip
         if self.down_share + self.up_share > 0.6 + 1e-9:
             raise ConfigurationError(

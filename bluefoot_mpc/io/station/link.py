@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import logging
-import select
-import threading
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -13,15 +9,12 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from bluefoot_mpc.io.clock import Clock, MonotonicClock
 from bluefoot_mpc.io.station.config import StationConfig
+from bluefoot_mpc.io.station.pump import Pump
 from bluefoot_mpc.io.station.robot_end import RobotEnd
 from bluefoot_mpc.io.station.signing import Signer, load_key
 from bluefoot_mpc.io.station.telemetry import Snapshot
-from bluefoot_mpc.io.station.transport import Address, Transport, open_transport
+from bluefoot_mpc.io.station.transport import Address, open_transport
 from bluefoot_mpc.types import Mode, MotionCommand, SensorFrame, Telemetry
-
-_LOG = logging.getLogger(__name__)
-_LONGEST_WAIT = 0.02
-"""s; what is published is seen by the thread after this time at the latest."""
 
 
 class StationLink:
@@ -52,13 +45,10 @@ class StationLink:
         signer = None if place.key is None else Signer(load_key(place.key))
         self._clock = clock or MonotonicClock()
         self._end = RobotEnd(config, self._clock.now(), signer)
-        self._transport: Transport = open_transport(place)
-        self.name = self._transport.name
+        transport = open_transport(place)
+        self.name = transport.name
         self._seen: tuple[Mode | None, str, tuple[str, ...]] = (None, "", ())
-        self._rest = b""
-        self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._serve, name="station link", daemon=True)
-        self._thread.start()
+        self._pump = Pump("station link", transport, self._end, self._clock)
 
     def publish(
         self, telemetry: Telemetry, frame: SensorFrame, state: str = "", reasons: tuple[str, ...] = ()
@@ -127,53 +117,10 @@ class StationLink:
 
     def close(self) -> None:
         """End the thread and give the port back. Idempotent."""
-        self._ending.set()
-        self._thread.join(timeout=2.0)
-        self._transport.close()
+        self._pump.close()
 
     def __enter__(self) -> StationLink:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    def _serve(self) -> None:
-        while not self._ending.is_set():
-            try:
-                self._turn()
-            except Exception:
-                # The boundary that keeps the robot safe: a link that broke is a silent one, and ages.
-                _LOG.exception("the station link failed; it goes on")
-                self._ending.wait(0.1)
-
-    def _turn(self) -> None:
-        self._wait()
-        # Bounded: however much babble arrives, telemetry gets its turn.
-        for _ in range(32):
-            data = self._transport.read()
-            if not data:
-                break
-            if self._end.receive(data, self._clock.now()):
-                self._transport.confirm()
-        self._send()
-
-    def _wait(self) -> None:
-        pause = _LONGEST_WAIT if self._rest else min(_LONGEST_WAIT, self._end.wait(self._clock.now()))
-        descriptor = self._transport.fileno()
-        if descriptor < 0:
-            self._ending.wait(_LONGEST_WAIT)
-            return
-        # A port that vanishes between the two lines shows with the next read.
-        with contextlib.suppress(OSError, ValueError):
-            select.select([descriptor], [], [], pause)
-
-    def _send(self) -> None:
-        while not self._ending.is_set():
-            if not self._rest:
-                self._rest = self._end.produce(self._clock.now()) or b""
-            if not self._rest:
-                return
-            taken = self._transport.write(self._rest)
-            self._rest = self._rest[taken:]
-            if self._rest:
-                return

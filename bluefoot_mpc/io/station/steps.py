@@ -1,0 +1,129 @@
+"""Motion as a list of steps: what a person would say, one after the other.
+
+    steps = Steps().stand(1.0).walk(5.0, forward=0.06).turn(3.0, left=20.0).pose(2.0, pitch=5.0).sit(2.0)
+
+A scenario asks ``steps.at(time)``; `bluefoot_mpc.io.station.client` sends the
+same steps over the link; ``bluefoot run remote --set scenario.script=...`` reads
+them from text, one step a line or parted by semicolons:
+``walk 5 forward=0.06; turn 3 left=20; sit 2``.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from pathlib import Path
+
+import numpy as np
+
+from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.settings import require_finite, require_positive
+from bluefoot_mpc.types import Mode, MotionCommand, TrunkPose
+
+STEPS = ("stand", "walk", "turn", "pose", "sit")
+
+
+class Steps:
+    """A sequence of commands, each held for a while. Every step returns the sequence again.
+
+    Attributes:
+        commands: the commands, in order.
+        ends: s, when each of them is over.
+    """
+
+    def __init__(self) -> None:
+        self.commands: list[MotionCommand] = []
+        self.ends: list[float] = []
+
+    @property
+    def duration(self) -> float:
+        """s, of the whole sequence."""
+        return self.ends[-1] if self.ends else 0.0
+
+    def at(self, time: float) -> MotionCommand:
+        """The command at `time` (s since the start); the last one holds for ever."""
+        for command, end in zip(self.commands, self.ends, strict=True):
+            if time < end:
+                return command
+        return self.commands[-1] if self.commands else MotionCommand()
+
+    def add(self, seconds: float, command: MotionCommand) -> Steps:
+        """Any command for some seconds."""
+        require_positive(seconds=seconds)
+        self.commands.append(command)
+        self.ends.append(self.duration + seconds)
+        return self
+
+    def stand(self, seconds: float) -> Steps:
+        """Stand level."""
+        return self.add(seconds, MotionCommand())
+
+    def walk(
+        self,
+        seconds: float,
+        *,
+        forward: float = 0.06,
+        left: float = 0.0,
+        turn: float = 0.0,
+        gait: str = "trot",
+    ) -> Steps:
+        """Walk: m/s forward and to the left, degrees/s to the left, ``"trot"`` or ``"walk"``."""
+        require_finite(forward=forward, left=left, turn=turn)
+        if gait not in ("trot", "walk"):
+            raise UnknownNameError("gait", gait, ("trot", "walk"))
+        velocity, rate = np.array([forward, left]), math.radians(turn)
+        return self.add(seconds, MotionCommand(mode=Mode.WALK, velocity=velocity, yaw_rate=rate, gait=gait))
+
+    def turn(self, seconds: float, *, left: float = 15.0, gait: str = "trot") -> Steps:
+        """Turn on the spot, degrees/s to the left."""
+        return self.walk(seconds, forward=0.0, turn=left, gait=gait)
+
+    def pose(
+        self, seconds: float, *, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0, height: float = 0.0
+    ) -> Steps:
+        """Stand with the trunk tilted, degrees (right side down, nose down, left), and raised, m."""
+        require_finite(roll=roll, pitch=pitch, yaw=yaw, height=height)
+        trunk = TrunkPose(position=np.array([0.0, 0.0, height]), rpy=np.radians(np.array([roll, pitch, yaw])))
+        return self.add(seconds, MotionCommand(trunk=trunk))
+
+    def sit(self, seconds: float) -> Steps:
+        """Sit down, and stay so."""
+        return self.add(seconds, MotionCommand(mode=Mode.SIT))
+
+
+def read_steps(text: str) -> Steps:
+    """The steps of a text, or of the file that it names.
+
+    Raises:
+        ConfigurationError: a step cannot be understood; the message names it.
+        UnknownNameError: there is no such step.
+    """
+    if "\n" not in text and len(text) < 1000 and Path(text).is_file():
+        text = Path(text).read_text(encoding="utf-8")
+    lines = (line.partition("#")[0].strip() for line in text.replace(";", "\n").splitlines())
+    steps = Steps()
+    for line in filter(None, lines):
+        _step(steps, line)
+    if not steps.commands:
+        raise ConfigurationError("the script has no steps, for example: walk 5 forward=0.06; sit 2")
+    return steps
+
+
+def _step(steps: Steps, line: str) -> None:
+    name, *words = line.split()
+    if name not in STEPS:
+        raise UnknownNameError("step", name, STEPS)
+    method = getattr(steps, name)
+    valid = [key for key in inspect.signature(method).parameters if key != "seconds"]
+    values: dict[str, float | str] = {}
+    try:
+        seconds = float(words[0])
+        for word in words[1:]:
+            key, _, value = word.partition("=")
+            if key not in valid:
+                raise UnknownNameError(f"value of '{name}'", key, valid)
+            values[key] = value if key == "gait" else float(value)
+    except (ValueError, IndexError):
+        form = " ".join((name, "SECONDS", *(f"{key}=NUMBER" for key in valid)))
+        raise ConfigurationError(f"cannot read the step '{line}'; it has the form: {form}") from None
+    method(seconds, **values)
