@@ -38,13 +38,16 @@ class OwnShafts:
 
     Attributes:
         configs: of the joints.
+        nominal_supply: V of the supply without load, at the start.
     """
 
     def __init__(self, joints: int | Sequence[ShaftConfig], supply: Supply | None = None) -> None:
         self.configs = (ShaftConfig(),) * joints if isinstance(joints, int) else tuple(joints)
         if not self.configs:
             raise ConfigurationError("shafts without a joint: give at least one")
-        self._bank = ShaftBank(self.configs, supply or Supply())
+        supply = supply or Supply()
+        self.nominal_supply = supply.voltage
+        self._bank = ShaftBank(self.configs, supply)
         self._drives = [ShaftDrive()] * len(self.configs)
         self._waiting: deque[tuple[float, int, ShaftDrive]] = deque()
         self._time = math.nan  # s, of the newest step

@@ -66,6 +66,9 @@ class ServoLine:
         host_baud: bit/s that the host talks with.
         violation_kinds: protocol violations seen, how often by kind: ``"collision"``, ``"checksum"``,
             ``"length"``, ``"garbage"``, ``"timeout"``, ``"duplicate"``.
+        shafts: the joints.
+        is_switch_stuck: the power switch does nothing.
+        begun: s, before everything that happens on the line.
         requests: instruction packets understood, by instruction.
     """
 
@@ -74,8 +77,10 @@ class ServoLine:
         self.host_baud = baud
         self.violation_kinds: Counter[str] = Counter()
         self.requests: Counter[int] = Counter()
-        self._shafts = shafts
-        register = _baud_register(baud)
+        self.shafts = shafts
+        self.begun = -math.inf
+        self.is_switch_stuck = False
+        register = baud_register(baud)
         self.all = tuple(EmulatedServo(shafts, i, n, register, self._rewire) for i, n in enumerate(ids))
         self.servos = dict(zip(ids, self.all, strict=True))
         self._is_powered = True
@@ -91,7 +96,7 @@ class ServoLine:
         """Take bytes from the host of which the last arrived at `time` (s)."""
         if not data:
             return
-        self._shafts.advance(time)
+        self.shafts.advance(time)
         byte_time = 10.0 / self.host_baud
         start = time - len(data) * byte_time
         if start - self._last_byte > BYTE_TIMEOUT and self._buffer:
@@ -141,9 +146,9 @@ class ServoLine:
 
     def power(self, on: bool, time: float) -> None:
         """Switch the servos' supply at `time` (s): off is limp and deaf, and the RAM is lost."""
-        if on == self._is_powered:
+        if on == self._is_powered or self.is_switch_stuck:
             return
-        self._shafts.advance(time)
+        self.shafts.advance(time)
         self._is_powered = on
         for servo in self.all:
             self._supply(servo, time)
@@ -152,7 +157,7 @@ class ServoLine:
         """Unplug a servo from line and supply, or plug it in again, at `time` (s)."""
         if is_plugged == servo.is_plugged:
             return
-        self._shafts.advance(time)
+        self.shafts.advance(time)
         servo.is_plugged = is_plugged
         self._supply(servo, time)
 
@@ -288,7 +293,12 @@ def _mixed(first: bytes, second: bytes) -> bytes:
     return bytes(a & (b >> 1 | 0x80) for a, b in pairs)
 
 
-def _baud_register(baud: int) -> int:
+def baud_register(baud: int) -> int:
+    """Value of register 4 for a rate (bit/s).
+
+    Raises:
+        ConfigurationError: no servo talks at it.
+    """
     register = round(2_000_000 / baud) - 1 if baud > 0 else -1
     if not 0 <= register <= 254 or abs(2_000_000 / (register + 1) - baud) > BAUD_TOLERANCE * baud:
         raise ConfigurationError(
