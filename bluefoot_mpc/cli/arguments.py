@@ -262,24 +262,6 @@ class BenchCommand(Common):
             raise ConfigurationError(f"--workers = {self.workers} must be at least 1")
 
 
-ModelCommand = (
-    Annotated[CheckCommand, tyro.conf.subcommand("check")]
-    | Annotated[UrdfCommand, tyro.conf.subcommand("urdf")]
-    | Annotated[RomCommand, tyro.conf.subcommand("rom")]
-    | Annotated[PowerCommand, tyro.conf.subcommand("power")]
-)
-Command = (
-    Annotated[ListCommand, tyro.conf.subcommand("list")]
-    | Annotated[RunCommand, tyro.conf.subcommand("run")]
-    | Annotated[ReplayCommand, tyro.conf.subcommand("replay")]
-    | Annotated[
-        ModelCommand, tyro.conf.subcommand("model", description="Check and export the robot's model.")
-    ]
-    | Annotated[DriveCommand, tyro.conf.subcommand("drive")]
-    | Annotated[BenchCommand, tyro.conf.subcommand("bench")]
-)
-
-
 def parse_payload(text: str) -> tuple[float, float, float, float]:
     """(kg, x, y, z) from ``KG,X,Y,Z``.
 

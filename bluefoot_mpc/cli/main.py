@@ -13,7 +13,7 @@ from typing import cast
 from rich.console import Console
 from rich.text import Text
 
-from bluefoot_mpc.cli import arguments
+from bluefoot_mpc.cli import arguments, emulator_arguments
 from bluefoot_mpc.cli.messages import keep_traceback, messages_on_stderr
 from bluefoot_mpc.cli.outcome import FAILED, INTERRUPTED, OK, Outcome, to_json
 from bluefoot_mpc.cli.parse import parse
@@ -29,6 +29,7 @@ _EXECUTE: dict[type, str] = {
     arguments.PowerCommand: "model:power",
     arguments.DriveCommand: "drive:drive",
     arguments.BenchCommand: "bench:bench",
+    emulator_arguments.EmulatorCommand: "emulator:emulator",
 }
 """Command to the function that runs it; imported late, so that ``--help`` is quick."""
 
@@ -64,7 +65,8 @@ def main(argv: Sequence[str] | None = None, prog: str = "bluefoot") -> int:
         evidence = f"the traceback is in {keep_traceback(error)} (--debug shows it)"
         message = f"unexpected {type(error).__name__}: {error}"
         return _fail(message, FAILED, as_json, (*notes(error), evidence))
-    return _show(outcome, as_json)
+    status = _show(outcome, as_json)
+    return status if outcome.serve is None else _serve(outcome.serve, as_json)
 
 
 def notes(error: BaseException) -> tuple[str, ...]:
@@ -95,6 +97,15 @@ def _show(outcome: Outcome, as_json: bool) -> int:
         _leave_quietly(FAILED)
         return _fail(f"cannot write to standard output: {error.strerror or error}", FAILED, as_json=False)
     return outcome.status
+
+
+def _serve(serve: Callable[[], None], as_json: bool) -> int:
+    """What goes on after the page was shown."""
+    try:
+        serve()
+    except BlueFootError as error:
+        return _fail(str(error), error.exit_status, as_json)
+    return OK
 
 
 def _leave_quietly(status: int) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,11 +24,13 @@ class Outcome:
         status: exit status of the process.
         data: what ``--json`` prints; numpy values and paths are fine.
         page: what a person sees without ``--json``, top to bottom.
+        serve: what goes on after that, until Ctrl-C.
     """
 
     status: int = OK
     data: Mapping[str, Any] = field(default_factory=dict)
     page: tuple[RenderableType, ...] = ()
+    serve: Callable[[], None] | None = None
 
 
 def to_json(data: Mapping[str, Any]) -> str:

@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import tyro
 
-from bluefoot_mpc.cli import arguments
+from bluefoot_mpc.cli import arguments, commands
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 
 COMMANDS: dict[str, tuple[str, ...]] = {
@@ -22,6 +22,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "model": ("check", "urdf", "rom", "power"),
     "drive": (),
     "bench": (),
+    "emulator": (),
 }
 """Commands, and the words that must follow them."""
 
@@ -66,7 +67,7 @@ def parse(argv: Sequence[str], prog: str = "bluefoot") -> arguments.Common:
     try:
         with contextlib.redirect_stderr(complaint):
             parsed = tyro.cli(
-                cast(type[arguments.Common], arguments.Command),
+                cast(type[arguments.Common], commands.Command),
                 prog=prog,
                 description=_DESCRIPTION,
                 args=list(argv),

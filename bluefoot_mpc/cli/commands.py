@@ -1,0 +1,38 @@
+"""Every command by the word that a person types; families of commands have argument modules of their own."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import tyro
+
+from bluefoot_mpc.cli.arguments import (
+    BenchCommand,
+    CheckCommand,
+    DriveCommand,
+    ListCommand,
+    PowerCommand,
+    ReplayCommand,
+    RomCommand,
+    RunCommand,
+    UrdfCommand,
+)
+from bluefoot_mpc.cli.emulator_arguments import EmulatorCommand
+
+ModelCommand = (
+    Annotated[CheckCommand, tyro.conf.subcommand("check")]
+    | Annotated[UrdfCommand, tyro.conf.subcommand("urdf")]
+    | Annotated[RomCommand, tyro.conf.subcommand("rom")]
+    | Annotated[PowerCommand, tyro.conf.subcommand("power")]
+)
+Command = (
+    Annotated[ListCommand, tyro.conf.subcommand("list")]
+    | Annotated[RunCommand, tyro.conf.subcommand("run")]
+    | Annotated[ReplayCommand, tyro.conf.subcommand("replay")]
+    | Annotated[
+        ModelCommand, tyro.conf.subcommand("model", description="Check and export the robot's model.")
+    ]
+    | Annotated[DriveCommand, tyro.conf.subcommand("drive")]
+    | Annotated[BenchCommand, tyro.conf.subcommand("bench")]
+    | Annotated[EmulatorCommand, tyro.conf.subcommand("emulator")]
+)
