@@ -103,11 +103,20 @@ class ServoBus:
         entry = _register(register)
         return entry.decode(self.read_block(servo, entry.address, entry.size))
 
-    def read_block(self, servo: int, address: int, count: int, *, tries: int | None = None) -> bytes:
+    def read_block(
+        self, servo: int, address: int, count: int, *, tries: int | None = None, patience: float = 0.0
+    ) -> bytes:
         """Bytes of the control table.
 
         A repeated read asks for a byte more each time, so that a late reply to
         the one before cannot be taken for its own.
+
+        Args:
+            servo: ID.
+            address: first register.
+            count: bytes.
+            tries: requests before giving up; as configured where not given.
+            patience: s to wait longer than usual for each reply.
 
         Raises:
             NoReplyError, CorruptReplyError, ServoFaultError: they cannot be had.
@@ -122,7 +131,7 @@ class ServoBus:
             if length is None:
                 self._wait_for_late_replies(servo)
                 length = count
-            self.wire.begin(read_packet(servo, address, length), servo, length)
+            self.wire.begin(read_packet(servo, address, length), servo, length, patience)
             outcome = self._finish(servo)
             if outcome in {Outcome.OK, Outcome.REFUSED}:
                 break

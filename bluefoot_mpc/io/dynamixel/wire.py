@@ -107,7 +107,7 @@ class Wire:
         self._parser = StatusParser()
         self._free_at = self._earliest = 0.0
         self._servo = -1
-        self._count = 0
+        self._count = self._noise = 0
         self._head = b""
         self._last: tuple[int, bytes] = (-1, b"")
         self._expected: dict[int, dict[int, float]] = {}
@@ -159,7 +159,7 @@ class Wire:
         stale = self.link.read(_CHUNK, _PAST)
         if stale or self._parser.pending:
             self._throw_away(stale)
-        self._servo, self._count = servo, count
+        self._servo, self._count, self._noise = servo, count, 0
         self._head = bytes((0xFF, 0xFF, servo, count + 2))
         self.put(packet)
         self.asked_at = self._free_at
@@ -235,11 +235,13 @@ class Wire:
         return Outcome.OK
 
     def _lose(self) -> Outcome:
+        until = self.clock.now() + self.config.late_window
+        self._expected.setdefault(self._servo, {})[self._count] = until
+        if self._noise:
+            return self._spoil(f"{self._noise} unreadable bytes")
         counts = self.statistics.of(self._servo)
         counts.note(failed=True)
         counts.lost += 1
-        until = self.clock.now() + self.config.late_window
-        self._expected.setdefault(self._servo, {})[self._count] = until
         return Outcome.LOST
 
     def _spoil(self, detail: str) -> Outcome:
@@ -314,6 +316,7 @@ class Wire:
     def _count_problem(self, problem: Problem) -> None:
         if problem.kind is ProblemKind.GARBAGE:
             self.statistics.garbage_bytes += len(problem.data)
+            self._noise += len(problem.data)
         elif problem.kind is ProblemKind.BAD_CHECKSUM:
             self.statistics.bad_checksums += 1
 
