@@ -113,7 +113,8 @@ def advance(
     dt = min(max(step, 0.0), config.longest_step) if math.isfinite(step) else 0.0
     memory = replace(memory, now=inputs.now)
     if inputs.emergency or memory.state is GuardState.OFF:
-        return replace(memory, state=GuardState.OFF, sink=None, reason=memory.reason or inputs.emergency)
+        reason = memory.reason if memory.state is GuardState.OFF else inputs.emergency
+        return replace(memory, state=GuardState.OFF, sink=None, reason=reason)
     if memory.sink is not None:
         return _sinking(memory, memory.sink, sit, dt, config)
     if inputs.age <= config.hold_after and inputs.setpoint is not None:

@@ -215,7 +215,7 @@ class InertialMonitor:
         if not self._seen or self._age <= self._config.imu_hold + _SLACK:
             return []
         text = f"no usable inertial sample for {self._config.imu_hold:g} s: the robot does not walk on"
-        if self._age > self._config.imu_sit:
+        if self._age > self._config.imu_sit + _SLACK:
             text = f"no usable inertial sample for {self._config.imu_sit:g} s: the robot sits down"
             return [Fault(key="inertial sit", response=Response.SIT, text=f"{text}. {_IMU}")]
         return [Fault(key="inertial", response=Response.HOLD, text=f"{text}. {_IMU}", latched=False)]

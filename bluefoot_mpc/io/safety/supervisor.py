@@ -125,7 +125,7 @@ class SafetySupervisor:
         sent = self._lowered() if self._takes_over() else self.check(command)
         frame = self.robot.step(sent)
         self._watch(frame)
-        self._advance(Inputs(limp=not sent.torque_limit.any(), rests=self._powered is not None))
+        self._advance(limp=not sent.torque_limit.any())
         return frame
 
     def check(self, command: JointCommand) -> JointCommand:
@@ -136,6 +136,9 @@ class SafetySupervisor:
             self._unusable += self.period
             return self._capped(self._gate.held())
         self._unusable = 0.0
+        if self.stopped:
+            # No new goal either: a servo may take one as a wish to be switched on.
+            return self._capped(self._gate.held())
         passed = self._gate.passed(command)
         if self._gate.complaint is not None:
             self._book.note(self._gate.complaint)
@@ -204,14 +207,14 @@ class SafetySupervisor:
         faults = self._monitors.step(frame, self._watched.health() if self._watched is not None else None)
         self._book.take(fault for fault in faults if fault.response is not Response.EMERGENCY)
         for fault in faults:
-            if fault.response is Response.EMERGENCY:
+            if fault.response is Response.EMERGENCY and not self.stopped:
                 self.emergency(fault.text)
 
-    def _advance(self, inputs: Inputs) -> None:
+    def _advance(self, *, arm: bool = False, checks: Checks = Checks.PENDING, limp: bool = False) -> None:
         before = self._machine.state
         inputs = Inputs(
-            emergency=bool(self._emergency), level=self._book.request.level,
-            arm=inputs.arm, checks=inputs.checks, limp=inputs.limp, rests=inputs.rests,
+            emergency=bool(self._emergency), arm=arm, checks=checks, level=self._book.request.level,
+            limp=limp, rests=self._powered is not None,
         )  # fmt: skip
         self._machine = states.advance(self._machine, inputs, self.period, self._config)
         state = self._machine.state
@@ -244,17 +247,17 @@ class SafetySupervisor:
     def _arm(self, robot: PoweredRobot) -> SensorFrame:
         """Check, switch on with little torque, and ramp up while holding the present position."""
         try:
-            self._advance(Inputs(arm=True))
+            self._advance(arm=True)
             self._check(robot.preflight())
             frame = robot.arm(self._config.arming_torque)
             self._gate.reset()
             self._gate.locate(frame)
-            self._advance(Inputs(checks=Checks.PASSED))
+            self._advance(checks=Checks.PASSED)
             self._require_calm(frame)
             return self._ramp_up(frame)
         except BaseException:
             # Whatever ended it, Ctrl-C included: the robot is never left half armed.
-            self._advance(Inputs(checks=Checks.REFUSED))
+            self._advance(checks=Checks.REFUSED)
             robot.stop()
             raise
 
@@ -274,7 +277,7 @@ class SafetySupervisor:
         while self._machine.state is SafetyState.ARMING:
             frame = self.robot.step(self.check(hold))
             self._watch(frame)
-            self._advance(Inputs())
+            self._advance()
             self._require_calm(None)
         return frame
 

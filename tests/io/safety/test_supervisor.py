@@ -6,45 +6,8 @@ import pytest
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.io.robot import Robot
 from bluefoot_mpc.io.safety import SafetyConfig, SafetySupervisor
-from bluefoot_mpc.types import ImuBatch, JointCommand, SafetyLevel, SensorFrame
-
-
-def make_frame(time=0.0, **changes):
-    imu = ImuBatch(
-        time=np.zeros(0), gyro=np.zeros((0, 3)), accel=np.zeros((0, 3)),
-        magnetometer=np.zeros((0, 3)), valid=np.zeros(0, dtype=bool),
-    )  # fmt: skip
-    frame = SensorFrame(
-        time=time,
-        joint_position=np.zeros(16), joint_speed=np.zeros(16), joint_load=np.zeros(16),
-        joint_temperature=np.full(16, 30.0), joint_time=np.full(16, time),
-        joint_valid=np.ones(16, dtype=bool),
-        voltage=12.0, voltage_valid=True, imu=imu, contact=np.ones(4, dtype=bool),
-        contact_time=np.full(4, time), contact_valid=np.ones(4, dtype=bool),
-    )  # fmt: skip
-    return replace(frame, **changes)
-
-
-class FakeRobot:
-    period = 0.02
-
-    def __init__(self):
-        self.sent = []
-        self.next = make_frame()
-        self.stops = 0
-
-    def reset(self):
-        return self.next
-
-    def step(self, command):
-        self.sent.append(command)
-        return self.next
-
-    def stop(self):
-        self.stops += 1
-
-    def close(self):
-        pass
+from bluefoot_mpc.types import SafetyLevel
+from tests.io.safety.scripted import FakeRobot, goal, make_frame
 
 
 @pytest.fixture
@@ -57,10 +20,6 @@ def supervisor(fake):
     made = SafetySupervisor(fake, np.full(16, -1.0), np.full(16, 1.0), SafetyConfig())
     made.reset()
     return made
-
-
-def goal(value, torque=1.0):
-    return JointCommand(position=np.full(16, value), speed=np.zeros(16), torque_limit=np.full(16, torque))
 
 
 def test_the_supervisor_is_a_robot_itself(supervisor):
