@@ -5,6 +5,7 @@ OpenCV is imported when a camera is opened, not before.
 
 from __future__ import annotations
 
+import importlib
 import math
 import threading
 from dataclasses import dataclass
@@ -49,7 +50,6 @@ class Camera:
         config: how pictures are taken.
 
     Attributes:
-        fault: what is wrong; empty while pictures come.
         pictures: so far.
         reconnects: times that the camera was opened anew.
     """
@@ -64,7 +64,7 @@ class Camera:
         self._ended = threading.Event()
         self._arrived = threading.Condition()
         self._thread: threading.Thread | None = None
-        self.fault = "not started"
+        self._trouble = "not started"
         self.pictures = 0
         self.reconnects = 0
 
@@ -72,6 +72,15 @@ class Camera:
     def name(self) -> str:
         """Of the camera, for messages."""
         return f"camera {self._source}"
+
+    @property
+    def fault(self) -> str:
+        """What is wrong; empty while pictures come."""
+        image = self._newest
+        if self._trouble or image is None:
+            return self._trouble
+        age = self._clock.now() - image.time - self._config.delay
+        return f"no picture for {age:.1f} s" if age > self._config.silence else ""
 
     def start(self, timeout: float = 3.0) -> None:
         """Open the camera and wait for the first picture.
@@ -87,9 +96,8 @@ class Camera:
             self._thread.start()
         with self._arrived:
             if not self._arrived.wait_for(lambda: self.pictures > 0, timeout):
-                raise CameraError(
-                    f"{self.name}: {self.fault}. Check its cable, or give another number or file"
-                )
+                mend = "Check its cable, or give another number or file"
+                raise CameraError(f"{self.name}: {self.fault or 'gives no picture'}. {mend}")
 
     def take(self) -> CameraImage | None:
         """The newest picture, if it is newer than at the last call; never waits."""
@@ -118,24 +126,23 @@ class Camera:
     # -- the thread ---------------------------------------------------------------------
 
     def _run(self) -> None:
-        import cv2
-
+        cv2 = importlib.import_module("cv2")
         while not self._ended.is_set():
             capture = cv2.VideoCapture(self._source)
             try:
                 self._record(cv2, capture)
             except cv2.error as error:
-                self.fault = f"OpenCV: {str(error).strip()}"
+                self._trouble = f"OpenCV: {str(error).strip()}"
             finally:
                 capture.release()
-            if not self._ended.wait(0.0 if self._config.is_looped and not self.fault else self._config.retry):
+            if self._trouble and not self._ended.wait(self._config.retry):
                 self.reconnects += 1
 
     def _record(self, cv2: Any, capture: Any) -> None:
         """Keep the newest picture until the camera gives none any more."""
         config = self._config
         if not capture.isOpened():
-            self.fault = "cannot be opened"
+            self._trouble = "cannot be opened"
             return
         is_file = isinstance(self._source, str)
         if not is_file:
@@ -147,9 +154,9 @@ class Camera:
         while not self._ended.is_set():
             is_there, frame = capture.read()
             if not is_there:
-                self.fault = "the file has ended" if is_file and not config.is_looped else ""
+                self._trouble = "the file has ended" if is_file and not config.is_looped else ""
                 if not is_file:
-                    self.fault = "gives no pictures any more"
+                    self._trouble = "gives no pictures any more"
                 return
             now = self._clock.now()
             if now < due and not is_file:
@@ -165,5 +172,5 @@ class Camera:
         with self._arrived:
             self._newest, self._is_new = image, True
             self.pictures += 1
-            self.fault = ""
+            self._trouble = ""
             self._arrived.notify_all()

@@ -1,4 +1,4 @@
-"""The simulated LIDAR: one ray a step, cast from its mounting point into the world, with the sensor's errors."""
+"""The simulated LIDAR: one ray a step from its mounting point into the world, with the sensor's errors."""
 
 from __future__ import annotations
 

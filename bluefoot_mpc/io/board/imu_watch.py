@@ -61,8 +61,6 @@ class ImuWatch:
             return "its time is not known (clock jumped, or not compared yet)"
         if sample.raw != self._raw:
             self._raw, self._same_since = sample.raw, time
-        elif time - self._same_since > config.imu_frozen:
-            return f"frozen, the same numbers for {(time - self._same_since) * 1e3:.0f} ms"
         # One comparison serves both: nothing about a NaN is true.
         if not all(abs(value) <= config.gyro_limit for value in sample.gyro):
             return f"impossible angular velocity {_text(sample.gyro)} rad/s"
@@ -71,6 +69,8 @@ class ImuWatch:
         field = sample.magnetometer
         if field is not None and not all(abs(value) <= config.field_limit for value in field):
             return f"impossible magnetic field {_text(field)} of the nominal one"
+        if time - self._same_since > config.imu_frozen:
+            return f"frozen, the same numbers for {(time - self._same_since) * 1e3:.0f} ms"
         return ""
 
     def fault(self, now: float) -> str:
