@@ -19,15 +19,22 @@ class Clock(Protocol):
 
 
 class MonotonicClock:
-    """The machine's monotonic clock; changes of the wall clock do not touch it."""
+    """The machine's monotonic clock; changes of the wall clock do not touch it.
+
+    Args:
+        zero: s on the machine's clock that count as zero; two processes with one zero agree.
+    """
+
+    def __init__(self, zero: float = 0.0) -> None:
+        self.zero = zero
 
     def now(self) -> float:
         """Seconds."""
-        return time.monotonic()
+        return time.monotonic() - self.zero
 
     def sleep_until(self, when: float) -> None:
         """Sleep, without spinning."""
-        time.sleep(max(0.0, when - time.monotonic()))
+        time.sleep(max(0.0, when - self.now()))
 
 
 class VirtualClock:
@@ -43,3 +50,16 @@ class VirtualClock:
     def sleep_until(self, when: float) -> None:
         """Let time pass."""
         self._now = max(self._now, when)
+
+
+class PacedClock(VirtualClock):
+    """A virtual clock that is never ahead of the wall's: for looking on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._started = time.monotonic()
+
+    def sleep_until(self, when: float) -> None:
+        """Let time pass on both clocks."""
+        super().sleep_until(when)
+        time.sleep(max(0.0, self._started + self._now - time.monotonic()))

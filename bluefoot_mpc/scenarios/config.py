@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from bluefoot_mpc.control.config import ControlConfig
@@ -12,6 +12,7 @@ from bluefoot_mpc.control.names import CONTROLLERS, DEFAULT_CONTROLLER
 from bluefoot_mpc.control.presets import preset
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.io.safety import SafetyConfig
+from bluefoot_mpc.io.servo_robot.config import DevicesConfig
 from bluefoot_mpc.model.parameters import RobotParameters, load_parameters
 from bluefoot_mpc.scenarios.base import Scenario
 from bluefoot_mpc.scenarios.options import RunOptions
@@ -40,6 +41,7 @@ class StageConfig:
     """Configuration of everything but the scenario and the robot's body."""
 
     sim: SimConfig = field(default_factory=SimConfig)
+    devices: DevicesConfig = field(default_factory=DevicesConfig)
     safety: SafetyConfig = field(default_factory=SafetyConfig)
     control: ControlConfig = field(default_factory=ControlConfig)
 
@@ -59,6 +61,12 @@ class Resolved:
     scenario: Scenario
     stages: StageConfig
     parameters: RobotParameters
+
+    @property
+    def command_period(self) -> float:
+        """s, between two commands to the robot."""
+        simulated = self.run.robot == "sim"
+        return self.stages.sim.command_period if simulated else self.stages.devices.period
 
     def table(self) -> dict[str, Any]:
         """Everything as one nested table, for ``config.toml``, the log and the hash."""
@@ -93,13 +101,14 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
     control = merge(to_table(preset(controller, parameters)), _own_control(made, controller))
     table = merge({"control": control}, table)
     table = merge(table, _level_options(table, options))
+    table = merge(table, _device_options(options))
     stages = build(StageConfig, {key: table[key] for key in stage_names if key in table})
     sim = build(SimConfig, merge(to_table(stages.sim), _sim_options(options)), "sim")
     made.world = sim.world
     return Resolved(
         run=RunSection(scenario=scenario.name, seed=options.seed, robot=options.robot, controller=controller),
         scenario=made,
-        stages=StageConfig(sim=made.prepare(sim), safety=stages.safety, control=stages.control),
+        stages=replace(stages, sim=made.prepare(sim)),
         parameters=parameters,
     )
 
@@ -182,6 +191,12 @@ def _level_options(table: dict[str, Any], options: RunOptions) -> dict[str, Any]
                 "--level-mix has no effect without levelling: add --level pd or --level narx"
             )
     return {"control": {"leveling": chosen}} if chosen else {}
+
+
+def _device_options(options: RunOptions) -> dict[str, Any]:
+    given = {"ports": list(options.port), "baud": options.baud, "link": options.link}
+    chosen = {key: value for key, value in given.items() if value}
+    return {"devices": chosen} if chosen else {}
 
 
 def _sim_options(options: RunOptions) -> dict[str, Any]:

@@ -14,7 +14,6 @@ import orjson
 from bluefoot_mpc.control.config import ControlConfig
 from bluefoot_mpc.control.pipeline import Pipeline
 from bluefoot_mpc.exceptions import ConfigurationError, LogError
-from bluefoot_mpc.io.pacing import PacedRobot
 from bluefoot_mpc.io.robot import Robot
 from bluefoot_mpc.io.safety import SafetySupervisor
 from bluefoot_mpc.model.parameters import RobotParameters
@@ -41,8 +40,9 @@ from bluefoot_mpc.scenarios.folder import (
 )
 from bluefoot_mpc.scenarios.options import RunOptions
 from bluefoot_mpc.scenarios.registry import find_scenario
+from bluefoot_mpc.scenarios.robots import RunRobot, make_robot
 from bluefoot_mpc.settings import build, dump_toml
-from bluefoot_mpc.sim.robot import SimRobot
+from bluefoot_mpc.sim.body import Posture
 from bluefoot_mpc.viz.live import LiveView
 from bluefoot_mpc.viz.report import write_report
 
@@ -113,8 +113,8 @@ def simulate(name_or_path: str, options: RunOptions) -> RunResult:
     """
     resolved = resolve(find_scenario(name_or_path), options)
     made = _prepare(resolved)
-    hooks = LoopHooks(truth=made.simulator.truth)
-    data = _drive(made.simulator, made, resolved, resolved.scenario.source, hooks)
+    hooks = LoopHooks(truth=made.on.truth, rests=made.on.rests)
+    data = _drive(made.on.robot, made, resolved, resolved.scenario.source, hooks)
     return _judge(data, resolved, made.model, Path())
 
 
@@ -137,8 +137,9 @@ def run_commanded(
         LogError: the log cannot be written.
     """
     presentation = presentation or Presentation()
-    made = _prepare(resolved)
-    simulator = made.simulator
+    paced = options.view if presentation.paced is None else presentation.paced
+    made = _prepare(resolved, paced)
+    on = made.on
     folder = make_folder(options, resolved.run.scenario)
     if resolved.stages.control.leveling.loads_weights:
         # A copy: the file that was named may change, this run itself may write it.
@@ -147,13 +148,13 @@ def run_commanded(
     with writing(folder / CONFIG):
         (folder / CONFIG).write_text(dump_toml(made.table), encoding="utf-8")
     with log_in(folder):
-        with _observers(made.model, resolved, options, presentation) as observers:
-            paced = options.view if presentation.paced is None else presentation.paced
-            robot = PacedRobot(simulator) if paced else simulator
-            with Recorder(folder / LOG, made.table, simulator.period) as recorder:
-                hooks = LoopHooks(recorder=recorder, truth=simulator.truth, observers=observers)
-                data = _drive(robot, made, resolved, source, hooks)
-                recorder.finish(data.stop_reason, data.real_time_factor)
+        with (
+            _observers(made.model, resolved, options, presentation) as observers,
+            Recorder(folder / LOG, made.table, on.robot.period) as recorder,
+        ):
+            hooks = LoopHooks(recorder=recorder, truth=on.truth, observers=observers, rests=on.rests)
+            data = _drive(on.robot, made, resolved, source, hooks)
+            recorder.finish(data.stop_reason, data.real_time_factor)
         result = _judge(data, resolved, made.model, folder)
         _write_results(result, made.model, options.report)
         keep_weights(made.pipeline.learnt, folder / WEIGHTS)
@@ -166,28 +167,31 @@ class _Made:
 
     Attributes:
         model: the robot's model.
-        simulator: the simulated robot.
+        on: the robot.
         pipeline: the controller.
         table: everything resolved, with what the seed drew.
     """
 
     model: RobotModel
-    simulator: SimRobot
+    on: RunRobot
     pipeline: Pipeline
     table: dict[str, Any]
 
 
-def _prepare(resolved: Resolved) -> _Made:
+def _prepare(resolved: Resolved, paced: bool = False) -> _Made:
     model = RobotModel(resolved.parameters)
     resolved.scenario.check(model, resolved.stages.control)
-    simulator = SimRobot(model, resolved.stages.sim, resolved.run.seed)
-    try:
-        pipeline = Pipeline(model, resolved.stages.control, simulator.period)
-    except BaseException:
-        simulator.close()
-        raise
-    table = {**resolved.table(), "drawn": simulator.drawn}
-    return _Made(model=model, simulator=simulator, pipeline=pipeline, table=table)
+    period = resolved.command_period
+    pipeline = Pipeline(model, resolved.stages.control, period)
+    on = make_robot(resolved, model, sitting(pipeline, model), paced)
+    table = {**resolved.table(), "drawn": on.drawn}
+    return _Made(model=model, on=on, pipeline=pipeline, table=table)
+
+
+def sitting(pipeline: Pipeline, model: RobotModel) -> Posture:
+    """Joints and trunk height of the controller's sitting posture."""
+    height = float(pipeline.sitting.trunk_position[2]) + model.parameters.legs.foot_radius
+    return Posture(joints=pipeline.sitting_joints, height=height)
 
 
 @contextmanager
@@ -228,6 +232,7 @@ def _drive(
     """The loop itself; the robot is closed whatever happens."""
     try:
         supervised = supervise(robot, made.model, resolved)
+        supervised.watch_over(made.pipeline.sitting_joints)
         return run_loop(supervised, made.pipeline, source, hooks, made.table)
     finally:
         robot.close()

@@ -43,6 +43,7 @@ class SimPlant(SimBody):
         self._drives: list[ShaftDrive] = []
         self._sampled: deque[SensorFrame] = deque(maxlen=_KEPT)
         self._powers: list[float] = []
+        self._zero = 0.0
         self._frame = self.reset()
 
     def reset(self) -> SensorFrame:
@@ -61,13 +62,17 @@ class SimPlant(SimBody):
         self._truth.start_frame()
         return self._frame
 
+    def begin(self, time: float) -> None:
+        """Let the simulation's zero be at `time` (s) of whoever asks."""
+        self._zero = time
+
     def advance(self, time: float) -> None:
         """Let the physics pass until `time` (s).
 
         Raises:
             SimulationError: the physics became unstable.
         """
-        target = math.floor(time / self.config.physics_period + _EPSILON)
+        target = math.floor((time - self._zero) / self.config.physics_period + _EPSILON)
         while self._step < target:
             into = self._step % self._steps
             count = min(self._steps - into, target - self._step)
@@ -92,13 +97,17 @@ class SimPlant(SimBody):
             voltage=float(bank.voltage[0]),
         )
 
+    def set_supply(self, voltage: float) -> None:
+        """Change the voltage (V) of the pack without load."""
+        self._bank.set_open_voltage(voltage)
+
     def samples(self, since: float) -> ImuBatch:
         """Inertial samples after `since` (s), oldest first."""
-        batches = [frame.imu for frame in self._sampled if frame.time > since + _EPSILON]
+        batches = [frame.imu for frame in self._sampled if frame.time + self._zero > since + _EPSILON]
         if not batches:
             batches = [_emptied(self._frame.imu)]
         return ImuBatch(
-            time=np.concatenate([batch.time for batch in batches]),
+            time=np.concatenate([batch.time for batch in batches]) + self._zero,
             gyro=np.concatenate([batch.gyro for batch in batches]),
             accel=np.concatenate([batch.accel for batch in batches]),
             magnetometer=np.concatenate([batch.magnetometer for batch in batches]),
@@ -107,11 +116,15 @@ class SimPlant(SimBody):
 
     def switches(self) -> tuple[BoolArray, float]:
         """(4,) foot switches, and when they were sampled (s)."""
-        return self._frame.contact, float(self._frame.contact_time[0])
+        return self._frame.contact, float(self._frame.contact_time[0]) + self._zero
 
     def voltage(self) -> float:
         """V of the servos' supply, mean over the last window of the inertial sensor."""
         return self._frame.voltage
+
+    def current(self) -> float:
+        """A out of the pack, the same mean."""
+        return self._powers[-1] / self._frame.voltage if self._powers else 0.0
 
     def truth(self) -> TruthSample:
         """The true state now, with the mean power and all touches since it was last asked for."""
@@ -120,7 +133,7 @@ class SimPlant(SimBody):
             self._powers.clear()
         sample = super().truth()
         self._truth.start_frame()
-        return sample
+        return replace(sample, time=sample.time + self._zero) if self._zero else sample
 
     def _finish_window(self) -> None:
         self._require_stable()

@@ -18,7 +18,7 @@ import casadi as ca
 import numpy as np
 
 from bluefoot_mpc.codegen import compiled, made_once
-from bluefoot_mpc.io.emulation.shafts import MIDDLE, ShaftDrive
+from bluefoot_mpc.io.emulation.shafts import COUNT, MIDDLE, ShaftDrive
 from bluefoot_mpc.model import servo as law
 from bluefoot_mpc.model.parameters import BatteryParameters, ServoParameters
 from bluefoot_mpc.types import JOINTS, N_JOINTS, BoolArray, FloatArray, JointCommand
@@ -114,6 +114,7 @@ class ServoBank:
             state[:] = 0.0
         self._ramp[:] = _NO_RAMP
         self._slope[:] = self.config.gain / self.config.servo.compliance_slope
+        self._open_voltage[0] = self.config.open_voltage
         self._live[:] = 0.0
         self._shut_down[:] = False
         self._asked_limit = [0.0] * N_JOINTS
@@ -153,7 +154,7 @@ class ServoBank:
     def write_servo(self, index: int, drive: ShaftDrive) -> None:
         """Let the registers of one servo act; margin and punch are those of the parameter file."""
         servo, limit = self.config.servo, drive.torque_limit / law.FULL_DUTY
-        self.goal[index] = drive.goal - MIDDLE
+        self.goal[index] = (drive.goal - MIDDLE) * (COUNT / servo.step_angle)
         ramp = drive.speed * (law.SPEED_UNIT * self.config.period / servo.step_angle)
         if drive.is_wheel:
             self.goal[index] = -_FOR_EVER if drive.speed & _CLOCKWISE else _FOR_EVER
@@ -166,6 +167,10 @@ class ServoBank:
             self._wanted_limit[index] = limit
             self._shut_down[index] &= self.temperature[index] >= law.SHUTDOWN_TEMPERATURE
             self._apply_limits()
+
+    def set_open_voltage(self, voltage: float) -> None:
+        """Change the voltage (V) of the pack without load, until `reset`."""
+        self._open_voltage[0] = voltage
 
     @property
     def overheated(self) -> tuple[str, ...]:

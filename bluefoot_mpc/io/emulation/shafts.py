@@ -6,11 +6,14 @@ all joints of a simulated robot) stands behind `Shafts`.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
 MIDDLE = 512
 """Position count of the middle of a servo's range."""
+COUNT = math.radians(300.0) / 1023.0
+"""rad of one position count (AX-12A e-manual)."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

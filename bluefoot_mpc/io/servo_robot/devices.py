@@ -1,0 +1,242 @@
+"""The devices of a robot with servos, as one thing: what happens on the lines in a command period."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from bluefoot_mpc.io.board.driver import SensorBoard
+from bluefoot_mpc.io.board.readings import BoardReadings
+from bluefoot_mpc.io.calibration import Calibration
+from bluefoot_mpc.io.calibration import findings as calibration_findings
+from bluefoot_mpc.io.camera import Camera
+from bluefoot_mpc.io.clock import Clock
+from bluefoot_mpc.io.dynamixel import arming, units
+from bluefoot_mpc.io.dynamixel.arming import CheckConfig
+from bluefoot_mpc.io.dynamixel.bus import ServoBus
+from bluefoot_mpc.io.dynamixel.cycle import BusCycle, Readings
+from bluefoot_mpc.io.dynamixel.layout import ServoLayout
+from bluefoot_mpc.io.findings import Finding, Severity
+from bluefoot_mpc.io.lidar.driver import Lidar
+from bluefoot_mpc.io.safety.health import Health
+from bluefoot_mpc.io.servo_robot.config import DevicesConfig
+from bluefoot_mpc.io.servo_robot.frames import sensor_frame
+from bluefoot_mpc.model.servo import FULL_DUTY
+from bluefoot_mpc.types import N_LEGS, BoolArray, JointCommand, SensorFrame
+
+log = logging.getLogger(__name__)
+
+_LATELY = 50
+"""Cycles whose reading times decide how early reading starts."""
+_NO_BOARD = Finding(
+    part="sensor board",
+    text="there is none, and a robot without inertial sensor and foot switches cannot stand",
+    mend="Name its port: --set devices.board_port=/dev/ttyACM0",
+    severity=Severity.REFUSAL,
+)
+_BOOT = 0.3
+"""s that servos need after their supply came on."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Devices:
+    """Drivers of everything that the robot has.
+
+    Attributes:
+        buses: of the servos, one for each port.
+        cycle: scheduler on these buses.
+        layout: which servo drives which joint.
+        calibration: signs, offsets, IDs.
+        board: sensor and power board; None without one.
+        lidar: None without one.
+        camera: None without one.
+        model: name of the parameter set that the robot runs with.
+    """
+
+    buses: tuple[ServoBus, ...]
+    cycle: BusCycle
+    layout: ServoLayout
+    calibration: Calibration
+    board: SensorBoard | None = None
+    lidar: Lidar | None = None
+    camera: Camera | None = None
+    model: str = "bluefoot"
+
+
+class DeviceCycle:
+    """What is done with the devices, step by step. One thread calls it.
+
+    Attributes:
+        may_move: False until armed: goals are not sent.
+
+    Args:
+        devices: the drivers.
+        clock: the clock that their links were made with.
+        config: timing.
+    """
+
+    def __init__(self, devices: Devices, clock: Clock, config: DevicesConfig) -> None:
+        self._devices, self._clock, self._config = devices, clock, config
+        self._reading_times: deque[float] = deque(maxlen=_LATELY)
+        self._due = clock.now()
+        self._board: BoardReadings | None = None
+        self._joints: Readings | None = None
+        self.may_move = False
+
+    # -- once ------------------------------------------------------------------
+
+    def connect(self) -> SensorFrame:
+        """Switch the servos' supply on, hear all devices, read all servos; no torque.
+
+        What is missing is left to the check before arming.
+        """
+        self.may_move = False
+        devices, clock = self._devices, self._clock
+        if devices.lidar is not None:
+            devices.lidar.start()
+        if devices.board is not None:
+            devices.board.power(True)
+            devices.board.wait_power(True, self._config.connect_time)
+            clock.sleep_until(clock.now() + _BOOT)
+            devices.board.beat()
+        self.restart()
+        return self.collect()
+
+    def restart(self) -> None:
+        """Begin a new period now."""
+        self._due = self._clock.now()
+
+    def check(self) -> tuple[Finding, ...]:
+        """Everything that must hold before torque; writes nothing."""
+        devices, config = self._devices, CheckConfig(least_voltage=self._config.arming_voltage)
+        found = [*calibration_findings(devices.calibration, devices.model)]
+        found += devices.board.findings() if devices.board is not None else [_NO_BOARD]
+        found += devices.lidar.findings() if devices.lidar is not None else ()
+        found += devices.camera.findings() if devices.camera is not None else ()
+        for leg in range(N_LEGS):
+            joints = range(4 * leg, 4 * leg + 4)
+            found += arming.check_servos(devices.buses, devices.layout, config, joints)
+            self._beat()
+        # Ports are looked at once for each leg.
+        return tuple({(finding.part, finding.text): finding for finding in found}.values())
+
+    def arm(self, torque_limit: float) -> None:
+        """Hold the present position with a low torque limit.
+
+        Raises:
+            NotArmedError: a servo refused; every torque is off again.
+        """
+        for bus in self._devices.buses:
+            bus.latch.release()
+        try:
+            arming.arm(self._devices.buses, self._devices.layout, torque_limit)
+        except BaseException:
+            self.latch("not armed")
+            raise
+        self._devices.cycle.admit()
+        self.may_move = True
+        self._beat()
+        self.restart()
+
+    def cut(self, reason: str) -> tuple[Finding, ...]:
+        """Emergency: torque off three times, and the servos' supply, at once. Goals are refused."""
+        self.may_move = False
+        self.latch(reason)
+        self.cut_power()
+        return tuple(arming.broadcast_off(self._devices.buses))
+
+    def off(self, reason: str) -> tuple[Finding, ...]:
+        """Torque off three times, verified, then the servos' supply. Goals are refused from now on."""
+        self.may_move = False
+        self.latch(reason)
+        found = arming.torque_off(self._devices.buses, self._devices.layout)
+        self.cut_power()
+        return tuple(finding for finding in found if finding.severity is Severity.REFUSAL)
+
+    def latch(self, reason: str) -> None:
+        """Refuse every write that could move a servo, from any thread, until armed."""
+        for bus in self._devices.buses:
+            bus.latch.close(reason)
+
+    def cut_power(self) -> None:
+        """Cut the servos' supply, from any thread."""
+        if self._devices.board is not None:
+            self._devices.board.cut()
+
+    def close(self) -> None:
+        """Give back every port."""
+        devices = self._devices
+        for bus in devices.buses:
+            bus.link.close()
+        for device in (devices.board, devices.lidar, devices.camera):
+            if device is not None:
+                device.close()
+
+    # -- every period ----------------------------------------------------------
+
+    def send(self, command: JointCommand) -> None:
+        """Write goals, speeds and limits, if the robot is armed."""
+        if not self.may_move:
+            return
+        speed = [units.register_from_speed(value) for value in command.speed.tolist()]
+        limit = np.clip(command.torque_limit, 0.0, 1.0) * FULL_DUTY
+        goal = self._devices.calibration.counts(command.position)
+        self._devices.cycle.write(goal.astype(np.float64), np.array(speed, dtype=np.float64), limit)
+
+    def collect(self) -> SensorFrame:
+        """Let the rest of the period pass, read the servos at its end, and take what the others say."""
+        clock, devices = self._clock, self._devices
+        now = clock.now()
+        self._due = max(self._due + self._config.period, now)
+        longest = max(self._reading_times, default=0.0)
+        lead = max(self._config.read_lead, self._config.lead_margin * longest)
+        clock.sleep_until(self._due - min(lead, self._config.period))
+        started = clock.now()
+        self._joints = devices.cycle.read(self._due)
+        self._reading_times.append(clock.now() - started)
+        clock.sleep_until(self._due)
+        if devices.board is not None:
+            devices.board.poll()
+            self._board = devices.board.take()
+        self._beat()
+        if devices.lidar is not None:
+            devices.lidar.poll()
+        return sensor_frame(
+            clock.now(), self._joints, self._board, devices.calibration,
+            lidar=None if devices.lidar is None else devices.lidar.take(),
+            camera=None if devices.camera is None else devices.camera.take(),
+        )  # fmt: skip
+
+    def health(self) -> Health:
+        """What the devices say of themselves, as of the last period."""
+        joints, board = self._joints, self._board
+        if joints is None:
+            return Health(power_on=None if board is None else board.power_on)
+        return Health(
+            power_on=None if board is None else board.power_on,
+            shut_down=_where(joints.shut),
+            restarted=_where(joints.returned),
+            silent=_where(joints.suspects),
+        )
+
+    @property
+    def is_latched(self) -> bool:
+        """True while goals are refused."""
+        return any(bus.latch.closed for bus in self._devices.buses)
+
+    @property
+    def lost_ports(self) -> tuple[str, ...]:
+        """Names of servo ports that are gone, as of the last period."""
+        return () if self._joints is None else self._joints.lost_ports
+
+    def _beat(self) -> None:
+        if self._devices.board is not None:
+            self._devices.board.beat()
+
+
+def _where(joints: BoolArray) -> tuple[int, ...]:
+    """Numbers of the joints that are marked."""
+    return tuple(np.flatnonzero(joints).tolist())
