@@ -32,25 +32,30 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from bluefoot_mpc.io.dynamixel.table import Register
+from bluefoot_mpc.io.emulation.ax12a_checks import is_wheel, refusal
 from bluefoot_mpc.io.emulation.ax12a_table import (
+    ACTION,
     BAUD,
-    CCW_LIMIT,
-    CELLS,
-    CW_LIMIT,
     EEPROM_SIZE,
     FACTORY,
     GOAL,
     ID,
-    LOCK,
+    INSTRUCTION,
     MARGIN,
     MAX_TORQUE,
     MAX_VOLTAGE,
     MIN_VOLTAGE,
     MOVING,
+    OVERHEATING,
+    OVERLOAD,
+    PING,
     POSITION,
     PUNCH,
+    RANGE,
+    READ,
+    REG_WRITE,
     REGISTERED,
+    RESET,
     SHUTDOWN,
     SLOPE,
     SLOPES,
@@ -60,26 +65,17 @@ from bluefoot_mpc.io.emulation.ax12a_table import (
     TEMPERATURE_LIMIT,
     TORQUE_ENABLE,
     TORQUE_LIMIT,
-    is_writable,
+    VOLTAGE,
+    WRITE,
 )
-from bluefoot_mpc.io.emulation.shafts import ShaftDrive, Shafts
+from bluefoot_mpc.io.emulation.shafts import COUNT, MIDDLE, ShaftDrive, Shafts
 from bluefoot_mpc.model.servo import SPEED_UNIT
-
-BROADCAST = 254
-"""ID that every servo obeys and none answers."""
-
-VOLTAGE, ANGLE_LIMIT, OVERHEATING, RANGE, CHECKSUM, OVERLOAD, INSTRUCTION = (1 << bit for bit in range(7))
-"""Error bits of a status packet."""
-
-PING, READ, WRITE, REG_WRITE, ACTION, RESET, SYNC_WRITE = 1, 2, 3, 4, 5, 6, 0x83
 
 OVERLOAD_TIME = 2.0
 """s at the torque limit without moving until it counts as overload."""
 BOOT_TIME = 0.1
 """s after power-up in which a servo hears nothing."""
 
-_COUNTS_PER_RAD = 1023.0 / math.radians(300.0)
-_MIDDLE = 512
 _DIRECTION = 1 << 10
 _STALLED = 8  # counts of speed, 0.9 rpm
 
@@ -224,7 +220,7 @@ class EmulatedServo:
         """Write registers, or nothing; returns error bits."""
         if self._state_error:  # whose cause may be gone
             self.sense(time)
-        error = self._refusal(address, data)
+        error = refusal(self.registers, address, data)
         if error:
             return error
         registers = self.registers
@@ -232,7 +228,12 @@ class EmulatedServo:
         if address < EEPROM_SIZE:
             self.eeprom_writes += 1
         registers[address:end] = data
-        if address <= GOAL + 1 and end > GOAL and not self._is_wheel() and not registers[TORQUE_ENABLE]:
+        if (
+            address <= GOAL + 1
+            and end > GOAL
+            and not is_wheel(self.registers)
+            and not registers[TORQUE_ENABLE]
+        ):
             registers[TORQUE_ENABLE] = 1
             self.goal_writes_while_off += 1
         if self._state_error & registers[SHUTDOWN]:
@@ -246,7 +247,7 @@ class EmulatedServo:
         """Bring the registers of what is measured (36..46) and the lasting errors up to date."""
         state = self._shafts.state(self.index)
         registers = self.registers
-        count = math.floor(state.angle * _COUNTS_PER_RAD + 0.5) + _MIDDLE
+        count = math.floor(state.angle * (1.0 / COUNT) + 0.5) + MIDDLE
         count = 0 if count < 0 else 1023 if count > 1023 else count
         speed = _signed(state.speed / SPEED_UNIT)
         load = _signed(state.load * 1023.0)
@@ -257,13 +258,7 @@ class EmulatedServo:
         registers[POSITION:REGISTERED] = bytes(
             (count & 255, count >> 8, speed & 255, speed >> 8, load & 255, load >> 8, volts, degrees)
         )
-        error = 0
-        if not registers[MIN_VOLTAGE] <= volts <= registers[MAX_VOLTAGE]:
-            error = VOLTAGE
-        if degrees > registers[TEMPERATURE_LIMIT]:
-            error |= OVERHEATING
-        if self.forced_overload or self._is_overloaded(load & 1023, speed & 1023, time):
-            error |= OVERLOAD
+        error = self._lasting_errors(volts, degrees, load & 1023, speed & 1023, time)
         if error != self._state_error:
             self._state_error = error
             if error & registers[SHUTDOWN]:
@@ -272,6 +267,18 @@ class EmulatedServo:
         off = abs(self.read(GOAL, 2) - count)
         is_moving = registers[TORQUE_ENABLE] and speed & 1023 and off > registers[MARGIN]
         registers[MOVING] = 1 if is_moving else 0
+
+    def _lasting_errors(self, volts: int, degrees: int, load: int, speed: int, time: float) -> int:
+        """Error bits of what lasts; quantities as in the registers, without direction bits."""
+        registers = self.registers
+        error = 0
+        if not registers[MIN_VOLTAGE] <= volts <= registers[MAX_VOLTAGE]:
+            error = VOLTAGE
+        if degrees > registers[TEMPERATURE_LIMIT]:
+            error |= OVERHEATING
+        if self._is_overloaded(load, speed, time) or self.forced_overload:
+            error |= OVERLOAD
+        return error
 
     def _is_overloaded(self, load: int, speed: int, time: float) -> bool:
         limit = self.registers[TORQUE_LIMIT] | self.registers[TORQUE_LIMIT + 1] << 8
@@ -296,7 +303,7 @@ class EmulatedServo:
         """REG WRITE, ACTION, RESET and what does not exist; returns error bits."""
         self.sense(time)
         if instruction == REG_WRITE and len(data) > 1:
-            error = self._refusal(data[0], data[1:])
+            error = refusal(self.registers, data[0], data[1:])
             if not error:
                 self._registered = (data[0], data[1:])
                 self.registers[REGISTERED] = 1
@@ -314,46 +321,6 @@ class EmulatedServo:
             return 0
         return INSTRUCTION
 
-    def _refusal(self, address: int, data: bytes) -> int:
-        """Error bits of a write that would be refused, 0 where it is fine."""
-        end = address + len(data)
-        if end > TABLE_SIZE or (address < EEPROM_SIZE and self.registers[LOCK]):
-            return RANGE
-        error = 0
-        position = address
-        while position < end:
-            cell = CELLS[position]
-            if cell is None:  # an address without a register, taken and kept
-                position += 1
-                continue
-            error |= self._refusal_of(cell, position, data[position - address :])
-            position = cell.address + cell.size
-        return error
-
-    def _refusal_of(self, cell: Register, position: int, data: bytes) -> int:
-        """Error bits of a write to one register, or to the part of it that `data` covers."""
-        if not is_writable(cell):
-            return RANGE
-        offset = position - cell.address
-        given = data[: cell.size - offset]
-        kept = self.registers[cell.address : cell.address + cell.size]
-        kept[offset : offset + len(given)] = given
-        value = int.from_bytes(kept, "little")
-        high = cell.high
-        if cell.address == SPEED and not self._is_wheel():
-            high = 1023
-        if not cell.low <= value <= high:
-            return RANGE
-        # The lock can be set and not taken back.
-        if cell.address == LOCK and value == 0 and self.registers[LOCK]:
-            return RANGE
-        if cell.address == GOAL and not self._is_wheel():
-            return 0 if self.read(CW_LIMIT, 2) <= value <= self.read(CCW_LIMIT, 2) else ANGLE_LIMIT
-        return 0
-
-    def _is_wheel(self) -> bool:
-        return not any(self.registers[CW_LIMIT : CCW_LIMIT + 2])
-
     def _drive(self) -> None:
         """Let the registers act on the joint."""
         r = self.registers
@@ -365,7 +332,7 @@ class EmulatedServo:
                 goal=r[GOAL] | r[GOAL + 1] << 8,
                 speed=r[SPEED] | r[SPEED + 1] << 8,
                 torque_limit=limit,
-                is_wheel=self._is_wheel(),
+                is_wheel=is_wheel(self.registers),
                 margin=(r[MARGIN], r[MARGIN + 1]),
                 slope=(SLOPES[r[SLOPE]], SLOPES[r[SLOPE + 1]]),
                 punch=r[PUNCH] | r[PUNCH + 1] << 8,

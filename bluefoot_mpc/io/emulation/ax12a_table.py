@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from bluefoot_mpc.io.dynamixel.table import AX12A, RAM_START, Access, Register
+from bluefoot_mpc.io.dynamixel.table import AX12A, RAM_START, Register
+
+VOLTAGE, ANGLE_LIMIT, OVERHEATING, RANGE, CHECKSUM, OVERLOAD, INSTRUCTION = (1 << bit for bit in range(7))
+"""Error bits of a status packet."""
+
+PING, READ, WRITE, REG_WRITE, ACTION, RESET, SYNC_WRITE = 1, 2, 3, 4, 5, 6, 0x83
+"""Instructions of Protocol 1.0."""
+
+BROADCAST = 254
+"""ID that every servo obeys and none answers."""
 
 FIRMWARE = 24
 """Version that emulated servos report."""
@@ -30,11 +39,6 @@ CELLS: tuple[Register | None, ...] = tuple(
     for address in range(TABLE_SIZE)
 )
 """For every address the register that covers it, None where there is none."""
-
-
-def is_writable(cell: Register) -> bool:
-    """True where a host may write it."""
-    return cell.access is Access.WRITE
 
 
 def _factory() -> bytes:

@@ -42,7 +42,7 @@ class FaultyLine:
         self._reply, self._request, self._line = of["reply"], of["request"], of["line"]
         self._servo: ServoFaults | None = None
         if isinstance(device, ServoLine):
-            self._servo = ServoFaults(device, plan.faults)
+            self._servo = ServoFaults(device, plan.faults, start)
         self._seen: dict[int, int] = {}
         self._events = sorted({t for f in plan.faults for t in _moments(f) if math.isfinite(t)})
         self._waiting: list[tuple[float, int, bytes]] = []

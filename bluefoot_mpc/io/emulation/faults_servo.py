@@ -27,15 +27,16 @@ class ServoFaults:
     Args:
         line: the servos.
         faults: those of kinds that act on a servo, or on its EEPROM at the start; others are left alone.
+        start: s on the line's clock.
     """
 
-    def __init__(self, line: ServoLine, faults: Sequence[Fault]) -> None:
+    def __init__(self, line: ServoLine, faults: Sequence[Fault], start: float) -> None:
         self._line = line
         for fault in faults:
             _check_servo(line, fault)
             if KINDS[fault.kind].acts_on == "start":
                 for servo in self._servos(fault):
-                    _change(line, servo, fault)
+                    _change(line, servo, fault, start)
         self._lasting = [fault for fault in faults if KINDS[fault.kind].acts_on == "servo"]
         self._on = [False] * len(self._lasting)
 
@@ -114,12 +115,12 @@ def _ramp(fault: Fault, elapsed: float) -> float:
     return fault.amount + share * (fault.to - fault.amount)
 
 
-def _change(line: ServoLine, servo: EmulatedServo, fault: Fault) -> None:
+def _change(line: ServoLine, servo: EmulatedServo, fault: Fault, start: float) -> None:
     """A servo that is not as it should be, from the start."""
     value = int(fault.amount) if fault.kind != "missing" else 0
     match fault.kind:
         case "missing":
-            line.plug(servo, False, line.begun)
+            line.plug(servo, False, start)
         case "wrong_baud":
             servo.write(AX12A["baud_rate"].address, baud_register(value))
         case "duplicate_id":

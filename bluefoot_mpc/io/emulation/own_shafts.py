@@ -25,6 +25,7 @@ from bluefoot_mpc.settings import require_finite, require_nonnegative
 
 __all__ = ["OwnShafts", "ShaftConfig", "Supply", "bench_servo"]
 
+_EPSILON = 1e-6
 _REST_AFTER = 64
 """Steps after which joints that stand still are no longer stepped, only cooled."""
 
@@ -50,28 +51,30 @@ class OwnShafts:
         self._bank = ShaftBank(self.configs, supply)
         self._drives = [ShaftDrive()] * len(self.configs)
         self._waiting: deque[tuple[float, int, ShaftDrive]] = deque()
-        self._time = math.nan  # s, of the newest step
+        self._origin = math.nan  # s, when time began
+        self._steps = 0  # since then
         self._asked = math.nan  # s, newest time that was asked for
 
     def advance(self, time: float) -> None:
         """Let the physics pass until `time` (s); the first call sets where time begins."""
-        if math.isnan(self._time):
+        if math.isnan(self._origin):
             if math.isfinite(time):
-                self._time = self._asked = time
+                self._origin = self._asked = time
             return
         if time <= self._asked:
             return
         self._asked = time
         bank = self._bank
-        while self._time + STEP <= time:
-            while self._waiting and self._waiting[0][0] <= self._time:
-                _, index, drive = self._waiting.popleft()
-                bank.apply(index, drive)
+        # Steps lie on a grid, so that it does not matter how often somebody asks.
+        target = math.floor((time - self._origin) / STEP + _EPSILON)
+        while self._steps < target:
+            if self._waiting:
+                self._apply_waiting()
             if bank.still >= _REST_AFTER:
-                self._rest(time)
+                self._rest(target)
             else:
                 bank.step()
-                self._time += STEP
+                self._steps += 1
 
     def drive(self, index: int, drive: ShaftDrive) -> None:
         """Let a servo's registers act, after the joint's latency."""
@@ -92,7 +95,7 @@ class OwnShafts:
         speed = float(bank.speed[index])
         angle = float(bank.angle[index])
         return ShaftState(
-            angle=angle + speed * (self._asked - self._time) if speed else angle,
+            angle=angle + speed * (self._asked - self._origin - self._steps * STEP) if speed else angle,
             speed=speed,
             load=float(bank.duty[index]),
             temperature=float(bank.temperature[index]),
@@ -121,9 +124,17 @@ class OwnShafts:
         self._bank.speed[index] = 0.0
         self._bank.still = 0
 
-    def _rest(self, time: float) -> None:
-        """All joints stand still and nothing changes, until `time` or the next change."""
-        until = min(time, self._waiting[0][0]) if self._waiting else time
-        steps = max(1, math.floor((until - self._time) / STEP))
-        self._bank.rest(steps)
-        self._time += steps * STEP
+    def _apply_waiting(self) -> None:
+        """Let those registers act whose latency is over."""
+        now = self._origin + self._steps * STEP
+        while self._waiting and self._waiting[0][0] <= now + _EPSILON * STEP:
+            _, index, drive = self._waiting.popleft()
+            self._bank.apply(index, drive)
+
+    def _rest(self, target: int) -> None:
+        """All joints stand still and nothing changes, until the step `target` or the next change."""
+        if self._waiting:
+            change = math.ceil((self._waiting[0][0] - self._origin) / STEP - _EPSILON)
+            target = min(target, max(change, self._steps + 1))
+        self._bank.rest(target - self._steps)
+        self._steps = target

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bluefoot_mpc.io.emulation.shafts import ShaftDrive
+from bluefoot_mpc.io.emulation.shafts import MIDDLE, ShaftDrive
 from bluefoot_mpc.model.parameters import ServoParameters
 from bluefoot_mpc.model.servo import FULL_DUTY, SPEED_UNIT, current_per_torque, winding_resistance
 from bluefoot_mpc.settings import require_finite, require_nonnegative, require_positive
@@ -20,8 +20,6 @@ from bluefoot_mpc.types import FloatArray
 
 STEP = 1e-3
 """s, physics step."""
-MIDDLE = 512
-"""Position count of angle zero."""
 
 _NO_RAMP = 1e9
 _LOAD_FRICTION_SPEED = 0.1

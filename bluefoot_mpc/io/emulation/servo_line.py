@@ -20,15 +20,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.io.emulation.ax12a import (
-    BROADCAST,
-    CHECKSUM,
-    PING,
-    READ,
-    SYNC_WRITE,
-    EmulatedServo,
-)
-from bluefoot_mpc.io.emulation.ax12a_table import RETURN_DELAY
+from bluefoot_mpc.io.emulation.ax12a import EmulatedServo
+from bluefoot_mpc.io.emulation.ax12a_table import BROADCAST, CHECKSUM, PING, READ, RETURN_DELAY, SYNC_WRITE
 from bluefoot_mpc.io.emulation.shafts import Shafts
 
 RECEIVE_BUFFER = 143
@@ -65,10 +58,9 @@ class ServoLine:
         servos: the servos by the ID that they had at the start.
         host_baud: bit/s that the host talks with.
         violation_kinds: protocol violations seen, how often by kind: ``"collision"``, ``"checksum"``,
-            ``"length"``, ``"garbage"``, ``"timeout"``, ``"duplicate"``.
+            ``"length"``, ``"garbage"``, ``"timeout"``, ``"overlap"`` (of replies).
         shafts: the joints.
         is_switch_stuck: the power switch does nothing.
-        begun: s, before everything that happens on the line.
         requests: instruction packets understood, by instruction.
     """
 
@@ -78,7 +70,6 @@ class ServoLine:
         self.violation_kinds: Counter[str] = Counter()
         self.requests: Counter[int] = Counter()
         self.shafts = shafts
-        self.begun = -math.inf
         self.is_switch_stuck = False
         register = baud_register(baud)
         self.all = tuple(EmulatedServo(shafts, i, n, register, self._rewire) for i, n in enumerate(ids))
@@ -261,14 +252,21 @@ class ServoLine:
             if data is None:
                 continue
             start = end + servo.registers[RETURN_DELAY] * DELAY_UNIT
-            burst = _Burst(start, start + len(data) * 10.0 / servo.baud, data)
-            if self._bursts and self._bursts[-1].end > start:
-                self.violation_kinds["duplicate"] += 1
-                other = self._bursts.pop()
-                burst = _Burst(
-                    min(start, other.start), max(burst.end, other.end), _mixed(other.data, burst.data)
-                )
-            self._bursts.append(burst)
+            self._enqueue(_Burst(start, start + len(data) * 10.0 / servo.baud, data))
+
+    def _enqueue(self, burst: _Burst) -> None:
+        """Put a reply on the line, mixed with one that is there at the same time."""
+        bursts = self._bursts
+        if bursts and burst.start < bursts[-1].end:
+            for other in [other for other in bursts if burst.start < other.end and other.start < burst.end]:
+                self.violation_kinds["overlap"] += 1
+                bursts.remove(other)
+                data = _mixed(other.data, burst.data)
+                burst = _Burst(min(burst.start, other.start), max(burst.end, other.end), data)
+            bursts.append(burst)
+            self._bursts = deque(sorted(bursts, key=lambda entry: entry.end))
+        else:
+            bursts.append(burst)
 
     def _collide(self, start: float, end: float, byte_time: float) -> bool:
         """Garble the replies that the host talks over between `start` and `end` (s); True where it did."""
