@@ -67,5 +67,5 @@ class Monitors:
         if self._powered:
             faults += self._frames.step(advanced, dt)
         if health is not None:
-            faults += self._health.step(health)
+            faults += self._health.step(health, dt)
         return faults

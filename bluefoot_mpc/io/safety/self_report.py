@@ -24,14 +24,18 @@ class HealthMonitor:
     def reset(self) -> None:
         """Forget every fault."""
         self.dead: BoolArray = np.zeros(N_JOINTS, dtype=bool)
+        self._without_power = 0.0
+        self._had_power = False
 
-    def step(self, health: Health) -> list[Fault]:
-        """Judge an account."""
+    def step(self, health: Health, dt: float) -> list[Fault]:
+        """Judge an account that came `dt` (s) after the last one."""
         faults = [
             *self._lost(health.shut_down, "has switched itself off (overload or overheating)", "Let it cool"),
             *self._lost(health.restarted, "lost its power and came back without torque", "Check its plug"),
         ]
-        if health.power_on is False:
+        self._had_power = self._had_power or health.power_on is True
+        self._without_power = self._without_power + dt if health.power_on is False else 0.0
+        if self._without_power > (0.0 if self._had_power else _POWER_ON_TIME):
             text = "the power board has switched the servos off. Check its switch and fuse, then arm anew"
             faults.append(Fault(key="power", response=Response.EMERGENCY, text=text))
         if health.guard in _GUARDED:
@@ -59,6 +63,8 @@ class HealthMonitor:
         return faults
 
 
+_POWER_ON_TIME = 0.5
+"""s after arming within which the board must say that the servos' supply is on."""
 _GUARDED = {GuardState.SINK: Response.STOP, GuardState.OFF: Response.EMERGENCY}
 _AWAY = (
     "the control thread was away for too long: the guard below it lowers the robot and switches it off. "

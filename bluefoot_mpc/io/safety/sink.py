@@ -60,6 +60,8 @@ def advance(sink: Sink, sit: FloatArray | None, dt: float, config: SinkConfig) -
         dt: s.
         config: speeds.
     """
+    if sink.limp:
+        return sink
     if sit is None:
         return Sink(goal=sink.goal, torque=sink.torque, share=max(0.0, sink.share - dt / config.blind_time))
     way = sit - sink.goal

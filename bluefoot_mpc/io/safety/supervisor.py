@@ -236,7 +236,9 @@ class SafetySupervisor:
 
     def _begin(self) -> Sink:
         held = self._gate.held()
-        return Sink(goal=held.position, torque=held.torque_limit)
+        # A robot that is limp already is not moved once more.
+        share = 1.0 if held.torque_limit.any() else 0.0
+        return Sink(goal=held.position, torque=held.torque_limit, share=share)
 
     def _lowered(self) -> JointCommand:
         """The next command of a robot that the supervisor lowers itself."""

@@ -49,6 +49,14 @@ def test_a_controlled_stop_lowers_the_robot_and_switches_it_off(supervisor, fake
     assert fake.log.count("disarm") == 1
 
 
+def test_a_limp_robot_is_not_moved_by_a_controlled_stop(supervisor, fake):
+    supervisor.step(goal(0.3, torque=0.0))
+    supervisor.controlled_stop("the run is over")
+    assert fake.time - 1.0 < 0.5
+    assert all(not command.torque_limit.any() for command in fake.sent)
+    assert fake.log[-1] == "disarm"
+
+
 def test_afterwards_the_latch_holds_until_armed_anew(supervisor, fake):
     supervisor.controlled_stop("the run is over")
     moved = len(fake.moved)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.io.findings import Finding, Severity
+from bluefoot_mpc.io.findings import Finding, NotArmedError, Severity
 from bluefoot_mpc.io.safety import GuardState, Health, SafetyConfig, SafetyState
 from bluefoot_mpc.types import SafetyLevel
 from tests.io.safety.scripted import (
@@ -283,6 +283,26 @@ def test_power_switched_off_by_the_board_is_an_emergency(supervisor, fake):
     assert supervisor.state is SafetyState.EMERGENCY
     assert fake.latched  # servos that come back with the power must stay without torque
     assert "power board" in told(supervisor)
+
+
+@pytest.mark.parametrize(("late", "armed"), [(0.4, True), (0.6, False)])
+def test_the_board_may_take_a_moment_to_say_that_power_is_on(late, armed):
+    fake = FakePoweredRobot()
+    supervisor = supervise(fake)
+    fake.account = Health(power_on=False)
+
+    def switch_on():
+        if fake.time > late:
+            fake.account = Health(power_on=True)
+
+    fake.at_step = switch_on
+    if armed:
+        supervisor.reset()
+        assert supervisor.state is SafetyState.ACTIVE
+    else:
+        with pytest.raises(NotArmedError, match="power board"):
+            supervisor.reset()
+        assert fake.latched
 
 
 @pytest.mark.parametrize("field", ["shut_down", "restarted"])
