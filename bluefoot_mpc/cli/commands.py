@@ -17,7 +17,9 @@ from bluefoot_mpc.cli.arguments import (
     RunCommand,
     UrdfCommand,
 )
+from bluefoot_mpc.cli.doctor_arguments import DoctorCommand
 from bluefoot_mpc.cli.emulator_arguments import EmulatorCommand
+from bluefoot_mpc.cli.servo_arguments import ServoCommand
 
 ModelCommand = (
     Annotated[CheckCommand, tyro.conf.subcommand("check")]
@@ -35,4 +37,9 @@ Command = (
     | Annotated[DriveCommand, tyro.conf.subcommand("drive")]
     | Annotated[BenchCommand, tyro.conf.subcommand("bench")]
     | Annotated[EmulatorCommand, tyro.conf.subcommand("emulator")]
+    | Annotated[
+        ServoCommand,
+        tyro.conf.subcommand("servo", description="Find, set up, calibrate, test and identify servos."),
+    ]
+    | Annotated[DoctorCommand, tyro.conf.subcommand("doctor")]
 )

@@ -13,7 +13,7 @@ from typing import cast
 from rich.console import Console
 from rich.text import Text
 
-from bluefoot_mpc.cli import arguments, emulator_arguments
+from bluefoot_mpc.cli import arguments, doctor_arguments, emulator_arguments, servo_arguments
 from bluefoot_mpc.cli.messages import keep_traceback, messages_on_stderr
 from bluefoot_mpc.cli.outcome import FAILED, INTERRUPTED, OK, Outcome, to_json
 from bluefoot_mpc.cli.parse import parse
@@ -30,6 +30,12 @@ _EXECUTE: dict[type, str] = {
     arguments.DriveCommand: "drive:drive",
     arguments.BenchCommand: "bench:bench",
     emulator_arguments.EmulatorCommand: "emulator:emulator",
+    servo_arguments.ScanCommand: "servo:scan",
+    servo_arguments.SetupCommand: "servo:setup",
+    servo_arguments.CalibrateCommand: "servo_calibrate:calibrate",
+    servo_arguments.ExerciseCommand: "servo_motion:test",
+    servo_arguments.IdentifyCommand: "servo_motion:identify",
+    doctor_arguments.DoctorCommand: "doctor:doctor",
 }
 """Command to the function that runs it; imported late, so that ``--help`` is quick."""
 

@@ -23,6 +23,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "drive": (),
     "bench": (),
     "emulator": (),
+    "servo": ("scan", "setup", "calibrate", "test", "identify"),
+    "doctor": (),
 }
 """Commands, and the words that must follow them."""
 

@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterator, Sequence
 from types import FrameType, TracebackType
 from typing import Self
 
-from bluefoot_mpc.exceptions import ConfigurationError, DeviceError
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.io.clock import Clock, MonotonicClock
+from bluefoot_mpc.io.dynamixel.arming import broadcast_off
 from bluefoot_mpc.io.dynamixel.bus import BusConfig, ServoBus
 from bluefoot_mpc.io.dynamixel.errors import ServoError
 from bluefoot_mpc.io.link import Link, LinkError
@@ -125,10 +126,7 @@ def torque_off(ports: ServoPorts, ids: Sequence[int]) -> tuple[int, ...]:
     Returns:
         Those that still have torque, or whose state could not be read.
     """
-    for _ in range(3):
-        for bus in ports.buses:
-            with contextlib.suppress(DeviceError):
-                bus.broadcast("torque_enable", 0)
+    broadcast_off(ports.buses)
     return tuple(servo for servo in ids if not _is_limp(ports, servo))
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from bluefoot_mpc.exceptions import ConfigurationError, DeviceError
-from bluefoot_mpc.io.calibration import HIGHEST, Calibration
+from bluefoot_mpc.io.calibration import HIGHEST
 from bluefoot_mpc.io.commissioning.ports import ServoPorts
 from bluefoot_mpc.io.commissioning.survey import ServoFacts, Survey, look_at, survey_findings
 from bluefoot_mpc.io.dynamixel.bus import ServoBus
@@ -21,8 +21,6 @@ from bluefoot_mpc.io.dynamixel.units import baud_from_register, register_from_ba
 from bluefoot_mpc.io.findings import NotArmedError
 from bluefoot_mpc.settings import require_range
 
-LIMIT_MARGIN = 10
-"""Counts (2.9°) that the servo's own limits lie outside the soft limits: goals never reach them."""
 _BAUD_TOLERANCE = 0.03
 
 
@@ -34,6 +32,8 @@ class SetupConfig:
     temperature_limit: int = 70  # °C at which the servo itself switches off
     min_voltage: float = 6.0  # V, alarm only: the robot has its own thresholds
     max_voltage: float = 14.0  # V
+    cw_angle_limit: int = 0  # counts: all of its range, in joint mode; soft limits are the driver's
+    ccw_angle_limit: int = HIGHEST  # counts
     max_torque: int = 1023  # 0.1 %, torque limit after power-up
     status_return_level: int = 2  # answers everything
     alarm_led: int = 36  # overheating, overload
@@ -50,6 +50,8 @@ class SetupConfig:
             "temperature_limit": self.temperature_limit,
             "min_voltage_limit": round(10.0 * self.min_voltage),
             "max_voltage_limit": round(10.0 * self.max_voltage),
+            "cw_angle_limit": self.cw_angle_limit,
+            "ccw_angle_limit": self.ccw_angle_limit,
             "max_torque": self.max_torque,
             "status_return_level": self.status_return_level,
             "alarm_led": self.alarm_led,
@@ -67,13 +69,8 @@ class Change:
     new: int
 
 
-def plan(found: Survey, config: SetupConfig, calibration: Calibration | None = None) -> tuple[Change, ...]:
+def plan(found: Survey, config: SetupConfig) -> tuple[Change, ...]:
     """What has to be written so that every servo is as wanted.
-
-    Args:
-        found: the servos as they are.
-        config: what is wanted.
-        calibration: gives the angle limits; without one they are opened to the whole range.
 
     Raises:
         NotArmedError: a servo is missing, garbled or of another model.
@@ -84,24 +81,13 @@ def plan(found: Survey, config: SetupConfig, calibration: Calibration | None = N
     changes = []
     for facts in found.servos.values():
         _refuse_locked(facts)
-        wanted = config.registers() | angle_limits(facts.id, calibration)
+        wanted = config.registers()
         changes += [
             Change(servo=facts.id, register=name, old=facts[name], new=value)
             for name, value in wanted.items()
             if facts[name] != value
         ]
     return tuple(changes)
-
-
-def angle_limits(servo: int, calibration: Calibration | None) -> dict[str, int]:
-    """Limits of a servo: a little outside its joint's soft limits, or all of its range."""
-    low, high = 0, HIGHEST
-    joints = () if calibration is None else calibration.joints
-    for joint in joints:
-        if joint.id == servo:
-            lowest, highest = joint.limit_counts
-            low, high = max(0, lowest - LIMIT_MARGIN), min(HIGHEST, highest + LIMIT_MARGIN)
-    return {"cw_angle_limit": low, "ccw_angle_limit": high}
 
 
 def apply(ports: ServoPorts, changes: Sequence[Change], progress: Callable[[], None] = lambda: None) -> None:
