@@ -20,6 +20,7 @@ from bluefoot_mpc.cli.arguments import (
 from bluefoot_mpc.cli.doctor_arguments import DoctorCommand
 from bluefoot_mpc.cli.emulator_arguments import EmulatorCommand
 from bluefoot_mpc.cli.servo_arguments import ServoCommand
+from bluefoot_mpc.cli.station_arguments import StationCommand
 
 ModelCommand = (
     Annotated[CheckCommand, tyro.conf.subcommand("check")]
@@ -42,4 +43,5 @@ Command = (
         tyro.conf.subcommand("servo", description="Find, set up, calibrate, test and identify servos."),
     ]
     | Annotated[DoctorCommand, tyro.conf.subcommand("doctor")]
+    | Annotated[StationCommand, tyro.conf.subcommand("station")]
 )

@@ -13,7 +13,13 @@ from typing import cast
 from rich.console import Console
 from rich.text import Text
 
-from bluefoot_mpc.cli import arguments, doctor_arguments, emulator_arguments, servo_arguments
+from bluefoot_mpc.cli import (
+    arguments,
+    doctor_arguments,
+    emulator_arguments,
+    servo_arguments,
+    station_arguments,
+)
 from bluefoot_mpc.cli.messages import keep_traceback, messages_on_stderr
 from bluefoot_mpc.cli.outcome import FAILED, INTERRUPTED, OK, Outcome, to_json
 from bluefoot_mpc.cli.parse import parse
@@ -36,6 +42,7 @@ _EXECUTE: dict[type, str] = {
     servo_arguments.ExerciseCommand: "servo_motion:test",
     servo_arguments.IdentifyCommand: "servo_motion:identify",
     doctor_arguments.DoctorCommand: "doctor:doctor",
+    station_arguments.StationCommand: "station:station",
 }
 """Command to the function that runs it; imported late, so that ``--help`` is quick."""
 

@@ -25,6 +25,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "emulator": (),
     "servo": ("scan", "setup", "calibrate", "test", "identify"),
     "doctor": (),
+    "station": (),
 }
 """Commands, and the words that must follow them."""
 

@@ -139,6 +139,12 @@ class GroundLink:
         with self._lock:
             self._end.end.steer(motion, self.clock.now())
 
+    def order(self, order: Order, motion: MotionCommand) -> None:
+        """Give an order, and the motion that goes with it."""
+        with self._lock:
+            self._end.end.motion = motion
+        self.ask(order)
+
     def ask(self, order: Order) -> None:
         """Give an order; it is repeated until the robot answers."""
         now = self.clock.now()
@@ -157,6 +163,14 @@ class GroundLink:
         """What `look` makes of the newest picture of the robot, which does not change meanwhile."""
         with self._lock:
             return look(self._end.end.picture)
+
+    def tell(self, text: str, *, fault: bool = False) -> None:
+        """Add a line of the station's own to what the robot told."""
+        now = self.clock.now()
+        with self._lock:
+            if self.log is not None:
+                self.log.remark(text, now)
+            self._end.end.picture.tell(text, 3 if fault else 6, now)
 
     def quality(self) -> LinkQuality:
         """How well the two ends hear each other."""

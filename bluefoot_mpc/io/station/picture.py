@@ -30,11 +30,13 @@ class Text:
     """A line for the operator.
 
     Attributes:
+        number: counts all lines, from 1.
         time: s, when it arrived.
         severity: MAV_SEVERITY, 0 worst .. 7.
         text: as told.
     """
 
+    number: int
     time: float
     severity: int
     text: str
@@ -105,6 +107,11 @@ class RobotPicture:
         """Time (s) since anything came; infinite before that."""
         return now - max(self.arrived.values()) if self.arrived else math.inf
 
+    def tell(self, text: str, severity: int, now: float) -> None:
+        """Add a line for the operator."""
+        number = self.texts[-1].number + 1 if self.texts else 1
+        self.texts.append(Text(number=number, time=now, severity=severity, text=text))
+
     def _heartbeat(self, message: Any, now: float) -> None:
         self.mode, self.gait, self.state = unpack_mode(message.custom_mode)
         self.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
@@ -143,15 +150,14 @@ class RobotPicture:
 
     def _text(self, message: Any, now: float) -> None:
         if message.id == 0:
-            self.texts.append(Text(time=now, severity=message.severity, text=message.text))
+            self.tell(message.text, message.severity, now)
             return
         parts = self._parts.setdefault(message.id, [])
         if message.chunk_seq != len(parts):  # one was lost: what has come is told as it is
             parts.append("…")
         parts.append(message.text)
         if len(message.text) < 50:
-            text = "".join(self._parts.pop(message.id))
-            self.texts.append(Text(time=now, severity=message.severity, text=text))
+            self.tell("".join(self._parts.pop(message.id)), message.severity, now)
         while len(self._parts) > 8:
             self._parts.pop(next(iter(self._parts)))
 
