@@ -20,7 +20,7 @@ class BoardConfig:
     time_ahead: float = 0.05  # s that a stamp may lie after its arrival before the clock has jumped
     switch_silence: float = 0.10  # s without a message of the switches
     stuck_edges: int = 20  # edges of at least two other switches while one never changes
-    chatter_edges: int = 8  # edges of one switch within chatter_window: more is chatter
+    chatter_edges: int = 30  # edges within chatter_window, more is chatter: a quick trot's bounces make 20
     chatter_window: float = 0.5  # s
     chatter_rest: float = 1.0  # s with few edges until a chattering switch is trusted again
     power_silence: float = 0.2  # s without a message of the battery

@@ -16,8 +16,8 @@ from bluefoot_mpc.io.board.config import BoardConfig
 from bluefoot_mpc.io.board.messages import Switches
 from bluefoot_mpc.types import LEGS, N_LEGS, BoolArray
 
-_TRUSTED_EDGES = 4
-"""Edges in the window of a switch that may be trusted again: two steps of a quick gait."""
+_TRUSTED_EDGES = 15
+"""Edges in the window of a switch that may be trusted again: a quick gait on a floor where feet bounce."""
 
 
 class SwitchWatch:
