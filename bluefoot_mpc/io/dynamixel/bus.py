@@ -79,6 +79,10 @@ class ServoBus:
         """Counts of what went wrong."""
         return self.wire.statistics
 
+    def close(self) -> None:
+        """Give the port back. Idempotent, never raises."""
+        self.link.close()
+
     def ping(self, servo: int, *, tries: int | None = None, patience: float = 0.0) -> ErrorBit:
         """Ask whether a servo is there; gives its error bits.
 

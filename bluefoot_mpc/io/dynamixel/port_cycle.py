@@ -59,7 +59,7 @@ class PortCycle:
         self._jobs: list[tuple[ServoState, Kind, bool]] = []
         self._at = 0
         self._turn = 0
-        self._cut_off: set[tuple[int, bool]] = set()
+        self._cut_off: dict[tuple[int, bool], int] = {}
         self._begun = 0.0
         self._typical = self.wire.timeout(8, 2) - self.wire.patience
         self._reopen_at = 0.0
@@ -155,8 +155,9 @@ class PortCycle:
             probe.probe_at = now + self._config.probe_period
             jobs.append((probe, Kind.CHECK, True))
         if self._cut_off:
-            jobs.sort(key=lambda job: (job[0].id, job[1] is Kind.FULL) not in self._cut_off)
-            self._cut_off.clear()
+            late = self._cut_off
+            jobs.sort(key=lambda job: late.get((job[0].id, job[1] is Kind.FULL), len(late)))
+            self._cut_off = {}
         self._jobs = jobs
 
     def start_next(self, deadline: float) -> bool:
@@ -166,17 +167,19 @@ class PortCycle:
             LinkLostError: the port is gone.
         """
         while self._at < len(self._jobs):
-            servo, kind, _ = self._jobs[self._at]
+            servo, kind, is_last = self._jobs[self._at]
             self._begun = self._clock.now()
             if self._begun + self._typical > deadline:
-                self._cut_off = {(left.id, which is Kind.FULL) for left, which, _ in self._jobs[self._at :]}
+                rest = self._jobs[self._at :]
+                self._cut_off = {(left.id, which is Kind.FULL): i for i, (left, which, _) in enumerate(rest)}
                 return False
             self._at += 1
             count = self.wire.free_count(servo.id, kind.lengths)
             if count is None:
                 self._miss(servo)
                 continue
-            self.wire.begin(servo.requests[kind][count], servo.id, count)
+            haste = 0.0 if is_last or servo.misses else self.wire.haste
+            self.wire.begin(servo.requests[kind][count], servo.id, count, haste)
             if self.wire.doubted:
                 self._withdraw()
             return True
@@ -198,7 +201,7 @@ class PortCycle:
         now = self._clock.now()
         left = len(self._jobs) - self._at
         patience = wire.timeout(8, Kind.CHECK.lengths[-1])
-        if is_retry or servo.misses or now + left * self._typical + patience > deadline:
+        if is_retry or servo.misses > 1 or now + left * self._typical + patience > deadline:
             self._miss(servo)
             return
         wire.statistics.of(servo.id).retries += 1

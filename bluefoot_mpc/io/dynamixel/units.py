@@ -11,6 +11,27 @@ import math
 
 from bluefoot_mpc.model.servo import FULL_DUTY, SPEED_UNIT
 
+__all__ = [
+    "DELAY_UNIT",
+    "DIRECTION",
+    "FULL_DUTY",
+    "MIDDLE",
+    "POSITION_UNIT",
+    "SPEED_UNIT",
+    "angle_from_counts",
+    "baud_from_register",
+    "counts_from_angle",
+    "delay_from_register",
+    "load_from_register",
+    "register_from_baud",
+    "register_from_speed",
+    "register_from_torque_limit",
+    "signed",
+    "speed_from_register",
+    "unsigned",
+    "voltage_from_register",
+]
+
 MIDDLE = 512
 """Position count of the middle."""
 

@@ -57,7 +57,7 @@ def test_sizes_of_sixteen_servos():
 def test_impossible_packets_are_refused():
     with pytest.raises(ValueError, match="255 must lie"):
         ping_packet(255)
-    with pytest.raises(ValueError, match="receive buffer"):
+    with pytest.raises(ValueError, match="do not fit"):
         instruction_packet(1, Instruction.WRITE, bytes(138))
     with pytest.raises(ValueError, match="254 must lie"):
         status_packet(254)
