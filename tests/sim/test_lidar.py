@@ -1,0 +1,132 @@
+"""The simulated LIDAR in a room whose walls are known."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.io.lidar.geometry import FIRST_STEP, FRONT_STEP, POINTS, bearings
+from bluefoot_mpc.model.robot import load_robot
+from bluefoot_mpc.sim.config import SimConfig, WorldConfig
+from bluefoot_mpc.sim.lidar import NO_ECHO, LidarErrors, RaycastLidar
+from bluefoot_mpc.sim.randomization import draw
+from bluefoot_mpc.sim.world import build_world
+
+ROOM = """<mujoco><worldbody>
+<geom type="plane" size="9 9 .1"/>
+<geom type="box" size=".1 3 1" pos="2.1 0 1"/>
+<geom type="box" size="3 .1 1" pos="0 1.1 1"/>
+<geom type="box" size="3 .1 1" pos="0 -5.4 1"/>
+</worldbody></mujoco>"""
+"""Walls 2 m in front, 1 m to the left and 5.3 m to the right."""
+
+FRONT = FRONT_STEP - FIRST_STEP
+QUARTER = 256
+PERFECT = LidarErrors(noise_near=0.0, noise_far=0.0, dropouts=0.0, jitter_deg=0.0)
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load_robot()
+
+
+@pytest.fixture(scope="module")
+def world(robot, tmp_path_factory):
+    path = tmp_path_factory.mktemp("world") / "room.xml"
+    path.write_text(ROOM)
+    config = SimConfig(world=WorldConfig(name=str(path)))
+    return build_world(robot, config, draw(config, 0))
+
+
+def place(world, x=0.0, yaw=0.0, pitch_legs=0.0):
+    data = world.data
+    data.qpos[world.q : world.q + 7] = (x, 0, 0.25, math.cos(yaw / 2), 0, 0, math.sin(yaw / 2))
+    data.qpos[world.q + 7 : world.q + 23] = np.tile([0.0, pitch_legs, 0.0, 0.0], 4)
+    mujoco.mj_kinematics(world.model, data)
+
+
+def lidar(world, robot, errors=None, seed=0):
+    return RaycastLidar(world.model, world.data, world.trunk, robot.parameters.sensors.lidar, errors, seed)
+
+
+def test_walls_are_where_they_are(world, robot):
+    place(world)
+    mount = robot.parameters.sensors.lidar[0]
+    scan = lidar(world, robot, PERFECT).scan(0.0)
+    assert scan.shape == (POINTS,)
+    assert scan[FRONT] == round(1000 * (2.0 - mount))
+    assert scan[FRONT + QUARTER] == 1000
+    assert scan[FRONT - QUARTER] == 5300
+    # Behind there is nothing, and to the rear right the wall is out of reach.
+    assert scan[0] == NO_ECHO
+    corner = FRONT + 40
+    angle = bearings()[corner]
+    assert scan[corner] == pytest.approx(
+        1000 * min((2 - mount) / math.cos(angle), 1 / math.sin(angle)), abs=0.51
+    )
+
+
+def test_the_scan_turns_and_moves_with_the_robot(world, robot):
+    place(world, x=0.5, yaw=math.pi / 2)
+    mount = robot.parameters.sensors.lidar[0]
+    scan = lidar(world, robot, PERFECT).scan(0.0)
+    assert scan[FRONT] == round(1000 * (1.0 - mount))
+    assert scan[FRONT - QUARTER] == 1500
+
+
+def test_the_robot_does_not_see_itself(world, robot):
+    place(world)
+    free = lidar(world, robot, PERFECT).look(bearings())
+    place(world, pitch_legs=1.5)
+    sensor = lidar(world, robot, PERFECT)
+    raised = sensor.look(bearings())
+    assert sensor._is_robot[sensor._geom[sensor._geom >= 0]].any(), (
+        "no leg is in the way: the test shows nothing"
+    )
+    np.testing.assert_allclose(raised, free, atol=1e-6)
+
+
+def test_errors_have_the_sizes_that_are_asked_for(world, robot):
+    place(world)
+    sensor = lidar(world, robot, LidarErrors(jitter_deg=0.0))
+    true = sensor.look(bearings())
+    scans = np.array([sensor.scan(0.1 * k) for k in range(400)]) * 0.001
+    seen = ~np.isnan(true)
+    # The walls that are near the end of the range come and go with the noise.
+    inside = seen & (true < 5.2)
+    assert np.mean(scans[:, inside] == NO_ECHO) == pytest.approx(0.005, abs=0.0005)
+    error = np.where(scans > 0.0, scans - true, np.nan)
+    for ray in (FRONT, FRONT + QUARTER + 20, FRONT - QUARTER + 60):
+        if inside[ray]:
+            wanted = 0.010 if true[ray] < 1.0 else 0.01 * true[ray]
+            assert np.nanstd(error[:, ray]) == pytest.approx(wanted, rel=0.15)
+            assert abs(np.nanmean(error[:, ray])) < 0.2 * wanted
+    assert (scans[:, ~seen] == NO_ECHO).all()
+
+
+def test_jitter_turns_the_rays(world, robot):
+    place(world)
+    sensor = lidar(world, robot, LidarErrors(noise_near=0.0, noise_far=0.0, dropouts=0.0, jitter_deg=0.5))
+    slanted = FRONT + 60
+    scans = np.array([sensor.scan(0.0)[slanted] for _ in range(300)])
+    angle = bearings()[slanted]
+    slope = scans.mean() * math.tan(angle)
+    assert scans.std() == pytest.approx(slope * math.radians(0.5), rel=0.2)
+
+
+def test_the_seed_decides_and_reset_begins_anew(world, robot):
+    place(world)
+    first, same, other = (lidar(world, robot, seed=seed) for seed in (1, 1, 2))
+    scans = [sensor.scan(0.0) for sensor in (first, same, other)]
+    assert (scans[0] == scans[1]).all()
+    assert (scans[0] != scans[2]).any()
+    assert (first.scan(0.1) != scans[0]).any()
+    first.reset()
+    assert (first.scan(0.0) == scans[0]).all()
+
+
+def test_impossible_errors_are_refused():
+    with pytest.raises(ConfigurationError, match="dropouts"):
+        LidarErrors(dropouts=1.5)
