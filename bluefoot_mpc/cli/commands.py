@@ -21,6 +21,7 @@ from bluefoot_mpc.cli.doctor_arguments import DoctorCommand
 from bluefoot_mpc.cli.emulator_arguments import EmulatorCommand
 from bluefoot_mpc.cli.servo_arguments import ServoCommand
 from bluefoot_mpc.cli.station_arguments import StationCommand
+from bluefoot_mpc.cli.validate_arguments import ValidateCommand
 
 ModelCommand = (
     Annotated[CheckCommand, tyro.conf.subcommand("check")]
@@ -44,4 +45,5 @@ Command = (
     ]
     | Annotated[DoctorCommand, tyro.conf.subcommand("doctor")]
     | Annotated[StationCommand, tyro.conf.subcommand("station")]
+    | Annotated[ValidateCommand, tyro.conf.subcommand("validate")]
 )

@@ -19,6 +19,7 @@ from bluefoot_mpc.cli import (
     emulator_arguments,
     servo_arguments,
     station_arguments,
+    validate_arguments,
 )
 from bluefoot_mpc.cli.messages import keep_traceback, messages_on_stderr
 from bluefoot_mpc.cli.outcome import FAILED, INTERRUPTED, OK, Outcome, to_json
@@ -43,6 +44,7 @@ _EXECUTE: dict[type, str] = {
     servo_arguments.IdentifyCommand: "servo_motion:identify",
     doctor_arguments.DoctorCommand: "doctor:doctor",
     station_arguments.StationCommand: "station:station",
+    validate_arguments.ValidateCommand: "validate:validate",
 }
 """Command to the function that runs it; imported late, so that ``--help`` is quick."""
 

@@ -26,6 +26,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "servo": ("scan", "setup", "calibrate", "test", "identify"),
     "doctor": (),
     "station": (),
+    "validate": (),
 }
 """Commands, and the words that must follow them."""
 
@@ -89,7 +90,7 @@ def parse(argv: Sequence[str], prog: str = "bluefoot") -> arguments.Common:
 
 def option_names(command: Any) -> list[str]:
     """Options of a command as one types them, ``--help`` included."""
-    positional = {"scenario", "log"}
+    positional = {"scenario", "log", "config_file"}
     names = [f.name for f in dataclasses.fields(command) if f.name not in positional]
     return ["--help", *(f"--{name.replace('_', '-')}" for name in names)]
 
