@@ -132,9 +132,9 @@ def test_a_program_that_is_killed_leaves_no_torque_on(ports, program, how):
 
 def test_a_program_that_is_halted_leaves_no_torque_on_and_is_told_when_it_goes_on(ports, program):
     process = program()
-    process.send_signal(signal.SIGSTOP)
+    os.killpg(process.pid, signal.SIGSTOP)  # as Ctrl-Z does to all of a terminal's foreground
     expect_off(ports)
-    process.send_signal(signal.SIGCONT)
+    os.killpg(process.pid, signal.SIGCONT)
     assert "has switched torque off" in process.stdout.readline()
     # Whatever it wrote before it was told: torque is switched off once more.
     assert ports[0].read(len(TORQUE_OFF)).startswith(TORQUE_OFF)
