@@ -9,6 +9,7 @@ from bluefoot_mpc.io.emulation.faults_line import FaultyLine
 from bluefoot_mpc.io.emulation.memory_link import MemoryLink
 from bluefoot_mpc.io.emulation.own_shafts import OwnShafts
 from bluefoot_mpc.io.emulation.servo_line import ServoLine
+from bluefoot_mpc.io.link import LinkLostError
 from tests.io.emulation.bench import ALL, PING, READ, SYNC_WRITE, WRITE, low_high, packet, status
 from tests.io.emulation.test_memory_link import Parrot
 
@@ -154,6 +155,22 @@ def test_a_stalled_adapter_lets_nothing_pass_and_then_all():
     assert case.line.servos[1].read(25) == 1
 
 
+def test_a_reply_on_its_way_waits_for_a_stalls_end():
+    case = Case(Fault(kind="stall", start=1.0))
+    case.at(1.0 - 1e-4).link.write(packet(1, PING))
+    assert case.link.read(6, 2.0) == status(1)
+    assert case.clock.now() == pytest.approx(1.2)
+
+
+def test_what_was_on_its_way_is_gone_with_the_adapter():
+    case = Case(Fault(kind="late_reply", value=1.0), Fault(kind="usb_lost", start=0.5))
+    assert case.ask(1, PING) == b""
+    with pytest.raises(LinkLostError):
+        case.listen(1.0)
+    case.at(1.3).link.reopen()
+    assert case.listen(0.5) == b""
+
+
 def test_babble_drowns_everything_while_it_lasts():
     case = Case(Fault(kind="babble", start=1.0, end=1.1, value=10_000))
     assert case.ask(1, PING) == status(1)
@@ -179,10 +196,13 @@ def test_an_unplugged_servo_comes_back_with_its_ram_lost():
 def test_waiting_alone_lets_faults_begin():
     case = Case(Fault(kind="unplugged", servo=2, start=1.0))
     case.ask(2, WRITE, 30, *low_high(600))
-    case.listen(0.05)
+    case.shafts.advance(0.1)
     assert case.shafts.state(1).load != 0.0
     case.listen(2.0)
+    angle = case.shafts.state(1).angle
+    case.shafts.advance(2.0)
     assert case.shafts.state(1).load == 0.0
+    assert case.shafts.state(1).angle == pytest.approx(angle, abs=0.02)
     assert not case.line.servos[2].is_plugged
 
 

@@ -102,6 +102,8 @@ def test_a_lost_adapter_shows_when_it_happens_and_comes_back():
     with pytest.raises(LinkError, match="Plug"):
         link.reopen()
     bench.clock.sleep_until(1.7)
+    with pytest.raises(LinkLostError, match="reopen"):
+        link.read(6, 2.0)  # it is back, under a handle that nobody has
     link.reopen()
     link.write(packet(1, PING))
     assert link.read(6, 2.0) == status(1)

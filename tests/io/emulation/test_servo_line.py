@@ -65,7 +65,7 @@ def test_two_packets_at_once_are_both_obeyed(bench):
 
 
 def test_more_than_the_receive_buffer_is_no_packet(bench):
-    assert bench.send(packet(ALL, SYNC_WRITE, 24, 1, *[1] * 134)) == b""  # 143 bytes
+    assert bench.send(packet(ALL, SYNC_WRITE, 24, 2, *[1, 1, 0] * 45)) == b""  # 143 bytes
     assert bench.line.servos[1].read(24) == 1
     assert bench.send(packet(ALL, SYNC_WRITE, 24, 1, *[2, 1] * 68)) == b""  # 144 bytes
     assert bench.line.servos[2].read(24) == 0
