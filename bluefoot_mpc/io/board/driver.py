@@ -153,7 +153,8 @@ class SensorBoard:
         """Cut the servos' power at once, from any thread; repeated until the board says that it is off."""
         with self._lock:
             orders = self._power.cut(self._clock.now())
-        self._send(orders)
+        # A board that is not heard may still hear.
+        self._send(orders, even_if_lost=True)
 
     def wait_power(self, on: bool, timeout: float = 1.0) -> bool:
         """Poll and beat until the power is as asked for; False where it is not in time or was refused.
@@ -240,8 +241,8 @@ class SensorBoard:
                 orders.append((Kind.GET_HELLO, b""))
         self._send(orders)
 
-    def _send(self, orders: list[Order] | tuple[Order, ...]) -> bool:
-        if not orders or self._lost or self._closed:
+    def _send(self, orders: list[Order] | tuple[Order, ...], even_if_lost: bool = False) -> bool:
+        if not orders or self._closed or (self._lost and not even_if_lost):
             return False
         with self._lock:
             data = b""

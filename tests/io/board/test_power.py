@@ -85,6 +85,17 @@ def test_cuts_that_are_lost_are_repeated_and_heartbeats_stop():
     assert bench.driver.statistics.heartbeats == before
 
 
+def test_a_board_that_is_not_heard_is_cut_all_the_same():
+    bench = Bench()
+    bench.power_on()
+    bench.link.change = lambda data: b""
+    assert not bench.run(0.34)[-1].connected
+    bench.driver.cut()
+    began = bench.clock.now()
+    bench.board.advance(began + 0.02)
+    assert bench.robot.changes[-1] == (pytest.approx(began, abs=0.005), False)
+
+
 def test_power_needs_heartbeats():
     bench = Bench()
     bench.run(0.1, beat=False)
