@@ -15,15 +15,11 @@ from bluefoot_mpc.exceptions import ConfigurationError
 
 @dataclass(frozen=True, kw_only=True)
 class DoctorCommand(ServoArguments, ModelArguments):
-    """Check robot and software, and say how to mend each finding; writes nothing, switches nothing on.
+    """Check robot and software, and say how to mend each finding; writes nothing, gives no torque.
 
     Without devices it checks the software alone. Exit status 3 where something would refuse to be armed.
     """
 
-    board: Annotated[str | None, tyro.conf.arg(metavar="PATH", help_behavior_hint="")] = None
-    """Serial port of the sensor board."""
-    board_baud: int = 115_200
-    """Baud rate of the sensor board."""
     lidar: Annotated[str | None, tyro.conf.arg(metavar="PATH", help_behavior_hint="")] = None
     """Serial port of the LIDAR."""
     lidar_baud: int = 115_200

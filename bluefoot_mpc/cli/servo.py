@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
+from rich import box
 from rich.table import Table
 
 from bluefoot_mpc.cli.outcome import OK, Outcome
@@ -13,9 +15,11 @@ from bluefoot_mpc.cli.servo_arguments import ScanCommand, ServoArguments, SetupC
 from bluefoot_mpc.cli.servo_dialog import Answers, bar, findings_data, findings_table
 from bluefoot_mpc.exceptions import ConfigurationError, DeviceError
 from bluefoot_mpc.io.calibration import joint_of_id, load_calibration, now_text, save_calibration
+from bluefoot_mpc.io.clock import MonotonicClock
 from bluefoot_mpc.io.commissioning import setup as setting_up
 from bluefoot_mpc.io.commissioning.checks import silence
 from bluefoot_mpc.io.commissioning.ports import STANDARD_BAUDS, ServoPorts, split_ports
+from bluefoot_mpc.io.commissioning.supply import ServoSupply
 from bluefoot_mpc.io.commissioning.survey import (
     ServoFacts,
     Survey,
@@ -24,22 +28,30 @@ from bluefoot_mpc.io.commissioning.survey import (
     survey,
     survey_findings,
 )
+from bluefoot_mpc.io.serial_link import SerialLink
 
 REFUSED = 3
 """Exit status where the device is not as it must be."""
 NOTHING_WRITTEN = "nothing was written"
 
 
-def open_ports(command: ServoArguments, *, allow_eeprom: bool = False) -> ServoPorts:
-    """Open the ports of a command.
+@contextlib.contextmanager
+def open_ports(command: ServoArguments, *, allow_eeprom: bool = False) -> Iterator[ServoPorts]:
+    """The ports of a command, and the servos' supply where the sensor board switches it.
 
     Raises:
         ConfigurationError: no port is given, or a wrong baud rate.
         LinkError: a port cannot be opened.
+        DeviceError: the board does not switch the supply on.
     """
-    ports = split_ports(command.port)
+    names = split_ports(command.port)
     setting_up.check_baud(command.baud)
-    return ServoPorts(ports, command.baud, allow_eeprom=allow_eeprom)
+    clock = MonotonicClock()
+    with contextlib.ExitStack() as stack:
+        ports = stack.enter_context(ServoPorts(names, command.baud, allow_eeprom=allow_eeprom, clock=clock))
+        if command.board is not None:
+            stack.enter_context(ServoSupply(SerialLink(command.board, command.board_baud, clock), clock))
+        yield ports
 
 
 def scan(command: ScanCommand) -> Outcome:
@@ -88,7 +100,8 @@ def setup(command: SetupCommand) -> Outcome:
                 data={"changes": [], "written": False, "servos": ids},
                 page=(f"{len(ids)} servos are set up already, {NOTHING_WRITTEN}",),
             )
-        dialog.say(_plan_text(changes))
+        if not command.yes:
+            dialog.say(_plan_text(changes))
         if not dialog.confirm(f"Write {len(changes)} registers of permanent memory?"):
             raise DeviceError(f"not agreed: {NOTHING_WRITTEN}")
         with bar("write", len(changes)) as progress:
@@ -161,10 +174,11 @@ def _plan_text(changes: Sequence[setting_up.Change]) -> str:
 
 
 def _scan_table(found: Survey) -> Table:
-    table = Table(title="Servos", title_justify="left")
-    for heading in ("ID", "joint", "model", "firmware", "position", "V", "°C", "load %",
-                    "delay µs", "limits", "torque", "errors"):  # fmt: skip
-        table.add_column(heading, justify="left" if heading in ("joint", "errors") else "right")
+    table = Table(title="Servos", title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for heading in ("ID", "joint", "model", "firm-\nware", "posi-\ntion", "V", "°C", "load\n%",
+                    "delay\nµs", "limits", "tor-\nque", "errors"):  # fmt: skip
+        left = heading in ("joint", "errors")
+        table.add_column(heading, justify="left" if left else "right", no_wrap=heading != "errors")
     for facts in found.servos.values():
         table.add_row(*_cells(facts))
     return table

@@ -25,6 +25,10 @@ class ServoArguments(Common):
     """Baud rate of the servos."""
     ids: Annotated[str, tyro.conf.arg(metavar="ID,...")] = "1-16"
     """IDs of the servos, for example 1-16 or 1,2,7-9."""
+    board: Annotated[str | None, tyro.conf.arg(metavar="PATH", help_behavior_hint="")] = None
+    """Serial port of the sensor board, where the servos get their supply through it: on while this runs."""
+    board_baud: int = 115_200
+    """Baud rate of the sensor board."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 from rich.table import Table
 
@@ -16,10 +17,9 @@ from bluefoot_mpc.exceptions import ConfigurationError, DeviceError, UnknownName
 from bluefoot_mpc.io import calibration as cal
 from bluefoot_mpc.io.commissioning.calibrate import check_joints, posed, read_counts, untouched, with_checks
 from bluefoot_mpc.io.commissioning.checks import silence
-from bluefoot_mpc.io.commissioning.ports import ServoPorts, limp_afterwards, torque_off
+from bluefoot_mpc.io.commissioning.ports import ServoPorts, torque_off
 from bluefoot_mpc.io.commissioning.pose import Pose, drawing, joint_table, parse_pose, positive_direction
 from bluefoot_mpc.io.commissioning.survey import Survey, survey, survey_findings
-from bluefoot_mpc.io.findings import NotArmedError
 from bluefoot_mpc.model.legs.geometry import LegGeometry
 from bluefoot_mpc.model.parameters import RobotParameters, load_parameters
 from bluefoot_mpc.types import JOINTS, N_JOINTS
@@ -35,7 +35,7 @@ def calibrate(command: CalibrateCommand) -> Outcome:
         return _drawn(geometry, pose)
     base = _base(command, parameters)
     dialog = Answers(yes=command.yes)
-    with open_ports(command) as ports, limp_afterwards(ports, base.ids):
+    with open_ports(command) as ports:
         found = _found(ports, base.ids)
         still = torque_off(ports, base.ids)
         if still:
@@ -64,7 +64,7 @@ def _outcome(command: CalibrateCommand, made: cal.Calibration, model: str) -> Ou
             joint.name, str(joint.id), f"{joint.sign:+d}", str(joint.offset),
             f"{joint.offset * 300.0 / 1023.0:+.1f}", "yes" if joint.verified else "no",
         )  # fmt: skip
-    page = [table, f"wrote {command.out}"]
+    page: list[Any] = [table, f"wrote {command.out}"]
     if findings:
         page.insert(1, findings_table(findings, "What is left to do"))
     data = {
@@ -95,13 +95,13 @@ def _found(ports: ServoPorts, ids: Sequence[int]) -> Survey:
     """All servos of the calibration.
 
     Raises:
-        NotArmedError: one is missing, garbled or of another model.
+        DeviceError: one is missing, garbled or of another model.
     """
     with bar("look", len(ids)) as progress:
         found = survey(ports, ids, progress)
     findings = silence(ports, ids, found) or list(survey_findings(found))
     if findings:
-        raise NotArmedError(findings)
+        raise DeviceError("nothing was stored:\n  " + "\n  ".join(map(str, findings)))
     return found
 
 

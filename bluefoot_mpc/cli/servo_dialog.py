@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import sys
 from collections.abc import Callable, Iterator, Sequence
 
+from rich import box
 from rich import progress as bars
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.io.findings import Finding, Severity
@@ -75,16 +78,38 @@ class Answers:
 
 def findings_table(findings: Sequence[Finding], title: str) -> Table:
     """Findings as a table, each with its mend."""
-    table = Table(title=title, title_justify="left")
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for heading in ("", "part", "finding", "what to do"):
         table.add_column(heading, overflow="fold")
-    for finding in findings:
-        name = finding.severity.name.lower()
-        table.add_row(
-            f"[{_COLOURS[finding.severity]}]{name}[/]", _plain(finding.part), _plain(finding.text),
-            _plain(finding.mend),
-        )  # fmt: skip
+    for finding in _grouped(findings):
+        state = Text(finding.severity.name.lower(), _COLOURS[finding.severity])
+        table.add_row(state, Text(finding.part), Text(finding.text), Text(finding.mend))
     return table
+
+
+def _grouped(findings: Sequence[Finding]) -> list[Finding]:
+    """Findings with those that say the same of several servos as one."""
+    groups: dict[tuple[str, str, Severity, int], list[Finding]] = {}
+    for index, finding in enumerate(findings):
+        servo = finding.part.startswith("servo ")
+        key = (finding.text, finding.mend, finding.severity, servo or index)
+        groups.setdefault(key, []).append(finding)
+    return [
+        group[0] if len(group) == 1 else dataclasses.replace(group[0], part=f"servos {_numbers(group)}")
+        for group in groups.values()
+    ]
+
+
+def _numbers(group: Sequence[Finding]) -> str:
+    """Numbers of servos with ranges drawn together, ``1-4, 7``."""
+    numbers = [int(finding.part.split()[1]) for finding in group]
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)
 
 
 def findings_data(findings: Sequence[Finding]) -> list[dict[str, str]]:
@@ -106,8 +131,3 @@ def bar(label: str, total: int) -> Iterator[Callable[[], None]]:
     with bars.Progress(*columns, bars.TimeRemainingColumn(), console=console, transient=True) as shown:
         task = shown.add_task(label, total=total)
         yield lambda: shown.advance(task)
-
-
-def _plain(text: str) -> str:
-    """Text whose brackets are no markup."""
-    return text.replace("[", r"\[")

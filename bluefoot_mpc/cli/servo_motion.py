@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from rich import box
 from rich.table import Table
 
 from bluefoot_mpc.cli.outcome import FAILED, OK, Outcome
@@ -54,11 +55,11 @@ def test(command: ExerciseCommand) -> Outcome:
         speed=round(command.speed / _SPEED_COUNT),
     )  # fmt: skip
     dialog = Answers(yes=command.yes, terminal_only=True)
-    with open_ports(command) as ports, limp_afterwards(ports, ids):
+    with open_ports(command) as ports:
         require_sound(ports, ids)
         _agree(dialog, f"{len(ids)} servos will move by {command.amplitude:g}°. Does the robot hang free?")
         buses = {servo: bus_of(ports, servo) for servo in ids}
-        with bar("test", len(ids)) as progress:
+        with limp_afterwards(ports, ids), bar("test", len(ids)) as progress:
             results = exercise_all(buses, ports.clock, config, progress)
     faults = [result for result in results if result.fault]
     data = {"servos": [dataclasses.asdict(r) for r in results], "success": not faults, "torque": "off"}
@@ -105,11 +106,11 @@ def _recorded(command: IdentifyCommand) -> list[StepRecord]:
     })  # fmt: skip
     dialog = Answers(yes=command.yes, terminal_only=True)
     records: list[StepRecord] = []
-    with open_ports(command) as ports, limp_afterwards(ports, ids):
+    with open_ports(command) as ports:
         require_sound(ports, ids)
         most = max(plan.amplitudes_deg)
         _agree(dialog, f"{len(ids)} servos will step by up to ±{most:g}° at full speed. Are they free?")
-        with bar("steps", len(ids) * len(plan.goals())) as progress:
+        with limp_afterwards(ports, ids), bar("steps", len(ids) * len(plan.goals())) as progress:
             for servo in ids:
                 records += record_steps(bus_of(ports, servo), servo, plan, ports.clock, progress)
     return records
@@ -153,9 +154,22 @@ def _numbers(text: str) -> tuple[float, ...]:
 
 
 def _test_table(results: Sequence[ExerciseResult]) -> Table:
-    table = Table(title="Servos, moved one by one", title_justify="left")
-    for heading in ("ID", "joint", "asked °", "reached °", "back °", "time s", "peak load %", "°C", "V", ""):
-        table.add_column(heading, justify="left" if heading == "joint" else "right")
+    table = Table(
+        title="Servos, moved one by one", title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0)
+    )
+    for heading in (
+        "ID",
+        "joint",
+        "asked\n°",
+        "reached\n°",
+        "back\n°",
+        "time\ns",
+        "peak\nload %",
+        "°C",
+        "V",
+        "",
+    ):
+        table.add_column(heading, justify="left" if heading == "joint" else "right", no_wrap=True)
     for result in results:
         asked, there, back = (x / _COUNTS_PER_DEGREE for x in (result.asked, *result.reached))
         table.add_row(
@@ -167,7 +181,8 @@ def _test_table(results: Sequence[ExerciseResult]) -> Table:
 
 
 def _fit_table(found: Sequence[Identified], middle: Any) -> Table:
-    table = Table(title="Identified servos (± standard error)", title_justify="left")
+    table = Table(title="Identified servos (± standard error)", title_justify="left", box=box.SIMPLE_HEAD)
+    table.padding = (0, 1, 0, 0)
     table.add_column("servo", justify="right")
     for name in NAMES:
         table.add_column(f"{name.replace('_', ' ')}\n{_UNITS[name][1]}", justify="right")

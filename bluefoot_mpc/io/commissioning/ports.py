@@ -22,6 +22,9 @@ log = logging.getLogger(__name__)
 STANDARD_BAUDS = (1_000_000, 57_600, 115_200, 500_000, 200_000, 250_000, 400_000, 19_200, 9_600)
 """Rates that an AX-12A can have (e-manual, address 4), likely ones first."""
 
+PATIENCE = 0.02
+"""s that a reply may be late."""
+
 Opener = Callable[[str, int, Clock], Link]
 """Opens a port at a baud rate."""
 
@@ -56,7 +59,8 @@ class ServoPorts:
         self.clock = clock or MonotonicClock()
         self.baud = baud
         self._opener = opener
-        self._config = BusConfig(allow_eeprom=allow_eeprom)
+        # Nobody is in a hurry here: a host that is busy must not look like a servo that is missing.
+        self._config = BusConfig(allow_eeprom=allow_eeprom, margin=PATIENCE)
         self.buses: list[ServoBus] = []
         try:
             for port in ports:

@@ -18,7 +18,6 @@ from bluefoot_mpc.io.dynamixel.bus import ServoBus
 from bluefoot_mpc.io.dynamixel.codec import LAST_ID
 from bluefoot_mpc.io.dynamixel.errors import CorruptReplyError, NoReplyError
 from bluefoot_mpc.io.dynamixel.units import baud_from_register, register_from_baud
-from bluefoot_mpc.io.findings import NotArmedError
 from bluefoot_mpc.settings import require_range
 
 _BAUD_TOLERANCE = 0.03
@@ -73,11 +72,11 @@ def plan(found: Survey, config: SetupConfig) -> tuple[Change, ...]:
     """What has to be written so that every servo is as wanted.
 
     Raises:
-        NotArmedError: a servo is missing, garbled or of another model.
+        DeviceError: a servo is missing, garbled or of another model, or locked.
     """
     findings = survey_findings(found)
     if findings:
-        raise NotArmedError(findings)
+        raise DeviceError("nothing was written:\n  " + "\n  ".join(map(str, findings)))
     changes = []
     for facts in found.servos.values():
         _refuse_locked(facts)
