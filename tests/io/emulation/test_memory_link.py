@@ -102,8 +102,17 @@ def test_a_lost_adapter_shows_when_it_happens_and_comes_back():
     with pytest.raises(LinkError, match="Plug"):
         link.reopen()
     bench.clock.sleep_until(1.7)
-    with pytest.raises(LinkLostError, match="reopen"):
-        link.read(6, 2.0)  # it is back, under a handle that nobody has
     link.reopen()
     link.write(packet(1, PING))
     assert link.read(6, 2.0) == status(1)
+
+
+def test_an_adapter_that_is_back_needs_a_new_handle():
+    bench = Bench()
+    plan = FaultPlan(faults=(Fault(kind="usb_lost", start=1.0, end=2.0),))
+    link = MemoryLink(FaultyLine(bench.line, plan), bench.clock)
+    with pytest.raises(LinkLostError, match="gone"):
+        link.read(6, 5.0)
+    bench.clock.sleep_until(3.0)
+    with pytest.raises(LinkLostError, match="reopen"):
+        link.read(6, 5.0)
