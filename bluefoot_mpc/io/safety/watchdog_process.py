@@ -21,6 +21,7 @@ log = logging.getLogger(__name__)
 
 TORQUE_OFF = bytes((0xFF, 0xFF, 0xFE, 0x04, 0x03, 0x18, 0x00, 0xE2))
 """Broadcast, WRITE, address 24 (torque enable), 0; checksum ~(FE + 04 + 03 + 18 + 00) (AX-12A e-manual)."""
+_FIRED = "this program was silent for too long: the watchdog has switched torque off"
 START_TIMEOUT = 10.0
 """s until the process must have reported; a busy machine takes a second."""
 
@@ -75,9 +76,13 @@ class WatchdogProcess:
         return self._process.pid
 
     def beat(self) -> bool:
-        """Tell it that all is well; never blocks. False: it has fired or is gone, and torque must go now.
+        """Tell it that all is well; never blocks.
 
         Call it once per bus cycle, before anything is written that could move a servo.
+
+        Returns:
+            False when it has switched torque off: nothing may be written any more. Where it is
+            only gone, `lost` says so, and the robot should sit down.
         """
         with self._lock:
             if not self._lost and not self._closed:
@@ -85,7 +90,7 @@ class WatchdogProcess:
                 beats = now >= self._due
                 self._due = now + self._pause if beats else self._due
                 self._lost = self._exchange(watchdog.HEARTBEAT if beats else b"", ())
-            return not self._lost
+            return self._lost != _FIRED
 
     def replace(self, index: int, descriptor: int) -> None:
         """Hand over the descriptor of a port that was opened anew; `index` as in the ports at the start."""
@@ -137,5 +142,5 @@ class WatchdogProcess:
         except OSError:
             answer = b""
         if answer.startswith(watchdog.FIRED):
-            return "this program was silent for too long: the watchdog has switched torque off"
+            return _FIRED
         return "" if answer else "the watchdog process is gone"
