@@ -61,6 +61,7 @@ class PortCycle:
         self._turn = 0
         self._cut_off: dict[tuple[int, bool], int] = {}
         self._begun = 0.0
+        self._is_short = False
         self._typical = self.wire.timeout(8, 2) - self.wire.patience
         self._reopen_at = 0.0
         self._structs: dict[tuple[int, bool], struct.Struct] = {}
@@ -151,7 +152,8 @@ class PortCycle:
         if healthy:
             jobs.append((healthy[self._turn % len(healthy)], Kind.FULL, False))
         probe = min((s for s in servos if s.suspect), key=lambda servo: servo.probe_at, default=None)
-        if probe is not None and probe.probe_at <= now:
+        # Where nobody answers, the cause is common to all, and one answer tells that it is over.
+        if probe is not None and (probe.probe_at <= now or not asked):
             probe.probe_at = now + self._config.probe_period
             jobs.append((probe, Kind.CHECK, True))
         if self._cut_off:
@@ -166,24 +168,32 @@ class PortCycle:
         Raises:
             LinkLostError: the port is gone.
         """
-        while self._at < len(self._jobs):
+        begun = False
+        while self._at < len(self._jobs) and not begun:
             servo, kind, is_last = self._jobs[self._at]
             self._begun = self._clock.now()
             if self._begun + self._typical > deadline:
-                rest = self._jobs[self._at :]
-                self._cut_off = {(left.id, which is Kind.FULL): i for i, (left, which, _) in enumerate(rest)}
-                return False
+                for left, which, _ in self._jobs[self._at :]:
+                    self._put_off(left, which)
+                break
             self._at += 1
             count = self.wire.free_count(servo.id, kind.lengths)
             if count is None:
                 self._miss(servo)
                 continue
             haste = 0.0 if is_last or servo.misses else self.wire.haste
-            self.wire.begin(servo.requests[kind][count], servo.id, count, haste)
-            if self.wire.doubted:
-                self._withdraw()
-            return True
-        return False
+            # Nor longer than the cycle: what comes after its end is told from later replies by its length.
+            left_over = deadline - self._begun - self.wire.timeout(8, count)
+            self._is_short = left_over < haste
+            self.wire.begin(servo.requests[kind][count], servo.id, count, min(haste, left_over))
+            begun = True
+        if self.wire.doubted:
+            self._withdraw()
+        return begun
+
+    def _put_off(self, servo: ServoState, kind: Kind) -> None:
+        """Ask it first in the next cycle."""
+        self._cut_off.setdefault((servo.id, kind is Kind.FULL), len(self._cut_off))
 
     def finish(self, outcome: Outcome, deadline: float) -> None:
         """Take the outcome of the request that was sent last."""
@@ -198,6 +208,10 @@ class PortCycle:
             servo.error = wire.error
         if kind is Kind.FULL:
             return  # its position is known already
+        if self._is_short and outcome is Outcome.LOST:
+            servo.doubtful = True
+            self._put_off(servo, kind)
+            return
         now = self._clock.now()
         left = len(self._jobs) - self._at
         patience = wire.timeout(8, Kind.CHECK.lengths[-1])
@@ -239,6 +253,9 @@ class PortCycle:
             )
         elif was_suspect:
             log.warning("%s answers again", servo.part)
+        if was_suspect and all(other.suspect for other in self.servos if other is not servo):
+            for other in self.servos:
+                other.suspect = False  # still in doubt, and left out again at the next miss
 
     def _miss(self, servo: ServoState) -> None:
         servo.misses += 1
