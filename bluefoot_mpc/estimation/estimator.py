@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ from bluefoot_mpc.types import N_LEGS, BodyState, FloatArray, SensorFrame
 
 BLIND_TILT = 0.3  # rad, deviation of a level start without any inertial sample
 FIRST_FRAME = 0.02  # s, samples this old belong to the first frame
+MAX_LAG = 0.015  # s, an inertial sensor whose newest sample is further behind has missed some
 MIN_KNOWN_LEGS = 3
 _STANDING = {
     legs: tuple(leg in legs for leg in range(N_LEGS))
@@ -91,10 +93,12 @@ class Estimator:
         self._ground = GroundPlane(config.ground)
         self._level = LevelFloor(config.level, config.imu.accel_bias, self._settler)
         self._memory: _Memory | None = None
+        self._lag = 0.0  # s, of the newest inertial sample behind its frame
 
     def reset(self) -> None:
         """Forget everything; the next frame is the first."""
         self._memory = None
+        self._lag = 0.0
         self._ground.reset()
 
     @property
@@ -126,10 +130,23 @@ class Estimator:
                 of the clock: the estimate goes on from where it was, with doubt.
         """
         memory = self._memory
+        frame = self._at_newest_sample(frame)
         dt = math.nan if memory is None else frame.time - memory.time
         if memory is None or not 0.0 < dt <= self._config.max_step:
             return self._start(frame, memory)
         return self._go_on(frame, memory, dt)
+
+    def _at_newest_sample(self, frame: SensorFrame) -> SensorFrame:
+        """The frame at the time of its newest inertial sample, to which everything else is carried.
+
+        A sensor board's samples are some milliseconds on their way, and a sample that was taken before
+        the last frame belongs to this one all the same.
+        """
+        times = frame.imu.time
+        lag = frame.time - float(times[-1]) if len(times) else math.nan
+        if 0.0 <= lag <= MAX_LAG:
+            self._lag = lag
+        return frame if self._lag == 0.0 else replace(frame, time=frame.time - self._lag)
 
     def _go_on(self, frame: SensorFrame, memory: _Memory, dt: float) -> BodyState:
         """A frame that follows the previous one."""
@@ -223,7 +240,7 @@ class Estimator:
     def _read_joints(
         self, frame: SensorFrame, state: JointState, dt: float
     ) -> tuple[JointState, list[float]]:
-        """Advance the joint filter; angles are carried from their reading to the frame's time."""
+        """Advance the joint filter; angles are carried from their reading to the time of the estimate."""
         delay = frame.time - frame.joint_time
         return self._joints.advance(state, frame.joint_position, frame.joint_valid, delay, dt)
 

@@ -13,7 +13,7 @@ from bluefoot_mpc.estimation.config import JointFilterConfig
 from bluefoot_mpc.estimation.workspace import Workspace, compile_function
 from bluefoot_mpc.types import N_JOINTS, N_LEGS, BoolArray, FloatArray
 
-MAX_READ_DELAY = 0.03  # s, older joint readings are taken as they are
+MAX_READ_DELAY = 0.03  # s, joint readings further from the estimate's time are taken as they are
 
 
 class JointState(NamedTuple):
@@ -84,7 +84,7 @@ class JointFilter:
             state: memory.
             measured: (16,) rad; values that are not finite count as not valid.
             valid: (16,) False where no reading came.
-            delay: (16,) s since the readings; carried to now when short.
+            delay: (16,) s since the readings, negative for later ones; carried to now when short.
             dt: s since the previous call; 0 takes the reading over at rest.
 
         Returns:
@@ -130,7 +130,7 @@ def _tracker(config: JointFilterConfig) -> Any:
     dying = ca.if_else(valid, 1.0, ca.exp(-dt / config.memory)) * speed
     velocity = ca.if_else(fresh, 0.0, dying)
     age = ca.if_else(valid, 0.0, age + dt)
-    late = ca.if_else(ca.logic_and(delay > 0.0, delay <= MAX_READ_DELAY), delay, 0.0)
+    late = ca.if_else(ca.fabs(delay) <= MAX_READ_DELAY, delay, 0.0)
     newest = ca.if_else(valid, measured, position) + late * velocity
     known = [ca.mmax(age[4 * leg : 4 * leg + 4]) <= config.lost_after for leg in range(N_LEGS)]
     return compile_function(

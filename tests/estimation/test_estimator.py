@@ -384,3 +384,15 @@ def test_synthetic_rotation_is_the_shared_one():
     down = rotation_from_rpy(run.rpy[k]).T @ np.array([0.0, 0.0, 9.80665])
     force = run.frames[k].imu.accel[-1]
     assert np.abs(force - down).max() < 1.0
+
+
+@pytest.mark.parametrize("lag", [0.003, 0.007, 0.012])
+def test_samples_that_are_on_their_way_for_a_while_change_nothing(lag):
+    """A board's newest sample is older than its frame; joints and switches are as they were."""
+    run = make_run(Motion(duration=6.0), Sensors(), 0)
+    estimator, late = Estimator(geometry(), EstimatorConfig()), Estimator(geometry(), EstimatorConfig())
+    for frame in run.frames:
+        expected = estimator.step(frame)
+        seen = late.step(dataclasses.replace(frame, time=frame.time + lag))
+        np.testing.assert_allclose(seen.rpy, expected.rpy, atol=1e-9)
+        np.testing.assert_allclose(seen.linear_velocity, expected.linear_velocity, atol=1e-9)

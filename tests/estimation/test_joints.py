@@ -70,12 +70,13 @@ def test_a_silent_joint_goes_on_and_slows_down():
 def test_angles_are_carried_over_a_short_delay_only():
     tracker, state = JointFilter(CONFIG), initial_joints()
     delay = np.zeros(16)
-    delay[1:4] = 0.01, 2.0 * MAX_READ_DELAY, -0.01
+    delay[1:5] = 0.01, 2.0 * MAX_READ_DELAY, -0.01, -2.0 * MAX_READ_DELAY
     for k in range(40):
         state, known = tracker.advance(state, np.full(16, 0.02 * k), ALL, delay, DT if k else 0.0)
     speed = state.velocity[0]
     expected = np.full(16, 0.78)
     expected[1] += 0.01 * speed
+    expected[3] -= 0.01 * speed
     np.testing.assert_allclose(state.newest, expected, atol=1e-15)
     assert known == known_legs(state, CONFIG).tolist()
 

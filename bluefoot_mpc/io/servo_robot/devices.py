@@ -37,6 +37,8 @@ _NO_BOARD = Finding(
     mend="Name its port: --set devices.board_port=/dev/ttyACM0",
     severity=Severity.REFUSAL,
 )
+_TRIES = 5
+"""Periods more in which all servos may answer while the robot is being armed."""
 _BOOT = 0.3
 """s that servos need after their supply came on."""
 
@@ -209,6 +211,15 @@ class DeviceCycle:
             lidar=None if devices.lidar is None else devices.lidar.take(),
             camera=None if devices.camera is None else devices.camera.take(),
         )  # fmt: skip
+
+    def collect_all(self) -> SensorFrame:
+        """As `collect`, until every servo has answered in one period, some periods at most."""
+        frame = self.collect()
+        for _ in range(_TRIES):
+            if frame.joint_valid.all():
+                break
+            frame = self.collect()
+        return frame
 
     def health(self) -> Health:
         """What the devices say of themselves, as of the last period."""

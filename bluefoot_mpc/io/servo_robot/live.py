@@ -278,4 +278,4 @@ class LiveRobot:
         self._cycle.arm(torque_limit)
         self._setpoint, self._given_at = None, self._clock.now()
         self._is_armed = True
-        return self._cycle.collect()
+        return self._cycle.collect_all()

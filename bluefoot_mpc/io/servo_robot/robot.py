@@ -59,7 +59,7 @@ class ServoRobot:
         """
         self._guard.reset()
         self._cycle.arm(torque_limit)
-        return self._cycle.collect()
+        return self._cycle.collect_all()
 
     def watch_over(self, sit: FloatArray) -> None:
         """Tell where to sink to: (16,) rad, the sitting posture."""
