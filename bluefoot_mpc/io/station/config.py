@@ -36,7 +36,7 @@ class StationConfig:
     station_system: int = 255  # MAVLink system of ground stations, as all of them have it
     station_component: int = 190  # MAV_COMP_ID_MISSIONPLANNER, the usual one of ground stations
     line_rate: int = 57600  # bit/s of the radio; a serial port's own baud rate outranks it
-    down_share: float = 0.44  # of the line that telemetry may use
+    down_share: float = 0.43  # of the line that telemetry may use
     up_share: float = 0.16  # of the line that the station may use
     burst: int = 240  # bytes that may leave at once
     heartbeat_timeout: float = 2.5  # s without a heartbeat until commands begin to age whatever else comes

@@ -14,7 +14,7 @@ from bluefoot_mpc.io.station.robot_end import RobotEnd
 from bluefoot_mpc.io.station.signing import Signer, load_key
 from bluefoot_mpc.io.station.telemetry import Snapshot
 from bluefoot_mpc.io.station.transport import Address, open_transport
-from bluefoot_mpc.types import Mode, MotionCommand, SensorFrame, Telemetry
+from bluefoot_mpc.types import MotionCommand, SensorFrame, Telemetry
 
 
 class StationLink:
@@ -47,7 +47,7 @@ class StationLink:
         self._end = RobotEnd(config, self._clock.now(), signer)
         transport = open_transport(place)
         self.name = transport.name
-        self._seen: tuple[Mode | None, str, tuple[str, ...]] = (None, "", ())
+        self._seen: tuple[str, tuple[str, ...]] = ("", ())
         self._pump = Pump("station link", transport, self._end, self._clock)
 
     def publish(
@@ -62,17 +62,15 @@ class StationLink:
             reasons: what the supervisor has against going on.
         """
         self._end.offer(Snapshot(telemetry=telemetry, frame=frame, state=str(state), reasons=reasons))
-        mode, known_state, known_reasons = self._seen
+        known_state, known_reasons = self._seen
         if state and state != known_state:
             self._end.say(mavlink.MAV_SEVERITY_NOTICE, f"state: {state}")
         for reason in reasons:
             if reason not in known_reasons:
                 self._end.say(mavlink.MAV_SEVERITY_CRITICAL, reason)
-        if mode is not telemetry.mode:
-            self._end.say(mavlink.MAV_SEVERITY_NOTICE, f"mode: {telemetry.mode}")
         for event in telemetry.events:
             self._end.say(mavlink.MAV_SEVERITY_INFO, event)
-        self._seen = (telemetry.mode, str(state), reasons)
+        self._seen = (str(state), reasons)
 
     def say(self, text: str, *, fault: bool = False) -> None:
         """Tell the operator something; returns at once."""

@@ -83,7 +83,7 @@ class Schedule:
         """Note that a stream has had its turn, whether there was something to send or not."""
         period = 1.0 / self._streams[name].rate
         # What was missed is not made up for: the newest value is all that counts.
-        self._due[name] = max(self._due[name] + period, now - period + 1e-9)
+        self._due[name] = max(self._due[name] + period, now + 0.5 * period)
 
     def hurry(self, name: str, now: float) -> None:
         """Make a stream due at once."""
