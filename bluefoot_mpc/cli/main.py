@@ -15,6 +15,7 @@ from rich.text import Text
 
 from bluefoot_mpc.cli import (
     arguments,
+    deploy_arguments,
     doctor_arguments,
     emulator_arguments,
     servo_arguments,
@@ -45,6 +46,7 @@ _EXECUTE: dict[type, str] = {
     doctor_arguments.DoctorCommand: "doctor:doctor",
     station_arguments.StationCommand: "station:station",
     validate_arguments.ValidateCommand: "validate:validate",
+    deploy_arguments.DeployCommand: "deploy:deploy",
 }
 """Command to the function that runs it; imported late, so that ``--help`` is quick."""
 
@@ -118,6 +120,8 @@ def _serve(serve: Callable[[], None], as_json: bool) -> int:
     """What goes on after the page was shown."""
     try:
         serve()
+    except KeyboardInterrupt:
+        return OK  # how it is meant to end
     except BlueFootError as error:
         return _fail(str(error), error.exit_status, as_json)
     return OK
