@@ -21,6 +21,9 @@ log = logging.getLogger(__name__)
 _BLEND = 0.05
 """Weight of the newest transaction in the typical time of one."""
 
+_LONG_GONE = 2
+"""Cycles without a reply after which a servo's return is news for the others."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class CycleConfig:
@@ -245,7 +248,7 @@ class PortCycle:
         return True
 
     def _hear(self, servo: ServoState, kind: Kind) -> None:
-        was_suspect = servo.suspect
+        was_suspect, missed = servo.suspect, servo.misses
         has_lost_ram = servo.take(kind, self.wire.data, self.wire.error, self.wire.asked_at)
         if has_lost_ram:
             log.warning(
@@ -253,9 +256,17 @@ class PortCycle:
             )
         elif was_suspect:
             log.warning("%s answers again", servo.part)
-        if was_suspect and all(other.suspect for other in self.servos if other is not servo):
-            for other in self.servos:
-                other.suspect = False  # still in doubt, and left out again at the next miss
+        if missed > _LONG_GONE:
+            self._hope(self._clock.now())
+
+    def _hope(self, now: float) -> None:
+        """A servo is back: what kept it away may have kept others away, so they are asked soon."""
+        silent = [servo for servo in self.servos if servo.suspect]
+        for servo in silent:
+            servo.probe_at = min(servo.probe_at, now)
+        if len(silent) == len(self.servos) - 1:
+            for servo in silent:
+                servo.suspect = False  # still in doubt, and left out again at the next miss
 
     def _miss(self, servo: ServoState) -> None:
         servo.misses += 1
