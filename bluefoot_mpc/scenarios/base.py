@@ -110,6 +110,11 @@ class Scenario(ABC):
         """Figures of its own for the summary, by name; by default none."""
         return {}
 
+    @property
+    def scripted(self) -> bool:
+        """False where the commands come from a ground station; by default they come from here."""
+        return True
+
     def source(self, time: float) -> MotionCommand | None:
         """The command, or None when the scenario is over."""
         return None if time >= self.config.duration else self.command(time)

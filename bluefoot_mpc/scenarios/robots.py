@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from bluefoot_mpc.io.pacing import PacedRobot
 from bluefoot_mpc.io.robot import PoweredRobot, Robot
 from bluefoot_mpc.model.robot import RobotModel
+from bluefoot_mpc.scenarios.base import Criterion
 from bluefoot_mpc.scenarios.config import Resolved
 from bluefoot_mpc.sim.body import Posture
 from bluefoot_mpc.sim.robot import SimRobot
@@ -68,3 +69,23 @@ def make_robot(resolved: Resolved, model: RobotModel, sitting: Posture, paced: b
     from bluefoot_mpc.scenarios.emulated import make_emulated  # noqa: PLC0415
 
     return make_emulated(resolved, model, sitting, paced)
+
+
+def device_criteria(seen: Mapping[str, Any] | None) -> list[Criterion]:
+    """What emulated devices must have seen of their driver; nothing to say where there are none."""
+    if seen is None:
+        return []
+    violations = {kind: count for kind, count in seen["protocol_violations"].items() if count}
+    told = ", ".join(f"{kind} {count}" for kind, count in violations.items())
+    on = seen["torque_on"]
+    return [
+        Criterion(name="no violation of the bus protocol", holds=not violations, detail=told or "none"),
+        Criterion(
+            name="no write to a servo's permanent memory", holds=not seen["eeprom_writes"],
+            detail=str(seen["eeprom_writes"]),
+        ),
+        Criterion(
+            name="every torque off at the end", holds=not on,
+            detail=f"on: servos {', '.join(map(str, on))}" if on else "off",
+        ),
+    ]  # fmt: skip

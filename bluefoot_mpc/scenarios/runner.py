@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import orjson
 
@@ -40,11 +40,14 @@ from bluefoot_mpc.scenarios.folder import (
 )
 from bluefoot_mpc.scenarios.options import RunOptions
 from bluefoot_mpc.scenarios.registry import find_scenario
-from bluefoot_mpc.scenarios.robots import RunRobot, make_robot
+from bluefoot_mpc.scenarios.robots import RunRobot, device_criteria, make_robot
 from bluefoot_mpc.settings import build, dump_toml
 from bluefoot_mpc.sim.body import Posture
 from bluefoot_mpc.viz.live import LiveView
 from bluefoot_mpc.viz.report import write_report
+
+if TYPE_CHECKING:
+    from bluefoot_mpc.scenarios.stationed import StationedRun
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -114,8 +117,8 @@ def simulate(name_or_path: str, options: RunOptions) -> RunResult:
     resolved = resolve(find_scenario(name_or_path), options)
     made = _prepare(resolved)
     hooks = LoopHooks(truth=made.on.truth, rests=made.on.rests)
-    data = _drive(made.on.robot, made, resolved, resolved.scenario.source, hooks)
-    return _judge(data, resolved, made.model, Path())
+    data = _drive(made, resolved, resolved.scenario.source, hooks)
+    return _judge(data, resolved, made, Path())
 
 
 def run_commanded(
@@ -149,13 +152,15 @@ def run_commanded(
         (folder / CONFIG).write_text(dump_toml(made.table), encoding="utf-8")
     with log_in(folder):
         with (
+            _station(options, resolved, source, on) as station,
             _observers(made.model, resolved, options, presentation) as observers,
             Recorder(folder / LOG, made.table, on.robot.period) as recorder,
         ):
-            hooks = LoopHooks(recorder=recorder, truth=on.truth, observers=observers, rests=on.rests)
-            data = _drive(on.robot, made, resolved, source, hooks)
+            seen_by = observers if station is None else (*observers, station.observe)
+            hooks = LoopHooks(recorder=recorder, truth=on.truth, observers=seen_by, rests=on.rests)
+            data = _drive(made, resolved, station or source, hooks, station)
             recorder.finish(data.stop_reason, data.real_time_factor)
-        result = _judge(data, resolved, made.model, folder)
+        result = _judge(data, resolved, made, folder)
         _write_results(result, made.model, options.report)
         keep_weights(made.pipeline.learnt, folder / WEIGHTS)
     return result
@@ -195,6 +200,24 @@ def sitting(pipeline: Pipeline, model: RobotModel) -> Posture:
 
 
 @contextmanager
+def _station(
+    options: RunOptions, resolved: Resolved, source: CommandSource, on: RunRobot
+) -> Iterator[StationedRun | None]:
+    """The ground station of a run, where one is wanted."""
+    if options.station is None:
+        yield None
+        return
+    # MAVLink takes a while to load, and most runs need none.
+    from bluefoot_mpc.io.station.link import StationLink  # noqa: PLC0415
+    from bluefoot_mpc.scenarios.stationed import StationedRun  # noqa: PLC0415
+
+    with StationLink(options.station) as link:
+        # A station leads only where nothing else does.
+        own = source if resolved.scenario.scripted else None
+        yield StationedRun(link, own, powered=on.rests)
+
+
+@contextmanager
 def _observers(
     model: RobotModel, resolved: Resolved, options: RunOptions, presentation: Presentation
 ) -> Iterator[tuple[Observer, ...]]:
@@ -223,16 +246,19 @@ def _write_results(result: RunResult, model: RobotModel, report: bool) -> None:
 
 
 def _drive(
-    robot: Robot,
     made: _Made,
     resolved: Resolved,
     source: CommandSource,
     hooks: LoopHooks,
+    station: StationedRun | None = None,
 ) -> RunData:
     """The loop itself; the robot is closed whatever happens."""
+    robot = made.on.robot
     try:
         supervised = supervise(robot, made.model, resolved)
         supervised.watch_over(made.pipeline.sitting_joints)
+        if station is not None:
+            station.attach(supervised)
         return run_loop(supervised, made.pipeline, source, hooks, made.table)
     finally:
         robot.close()
@@ -266,9 +292,20 @@ def pipeline_from_log(data: RunData, folder: Path | None = None) -> Pipeline:
     return Pipeline(RobotModel(parameters), control, data.period)
 
 
-def _judge(data: RunData, resolved: Resolved, model: RobotModel, folder: Path) -> RunResult:
+def _judge(data: RunData, resolved: Resolved, made: _Made, folder: Path) -> RunResult:
     scenario = resolved.scenario
-    summary = summarize(data, model, window=scenario.window(), figures=scenario.figures(data))
-    criteria = scenario.criteria(summary)
+    window = _since_first_frame(scenario.window(), data)
+    figures = dict(scenario.figures(data))
+    if made.on.devices is not None:
+        figures["devices"] = made.on.devices()
+    summary = summarize(data, made.model, window=window, figures=figures)
+    criteria = [*scenario.criteria(summary), *device_criteria(figures.get("devices"))]
     summary["success"] = success = all(criterion.holds for criterion in criteria)
     return RunResult(summary=summary, folder=folder, criteria=criteria, success=success, data=data)
+
+
+def _since_first_frame(window: tuple[float, float] | None, data: RunData) -> tuple[float, float] | None:
+    """A scenario's window in the time of the frames: arming takes a while before the first of them."""
+    if window is None or not data.frames:
+        return window
+    return window[0] + data.frames[0].time, window[1] + data.frames[0].time

@@ -13,7 +13,7 @@ from bluefoot_mpc.types import MotionCommand
 class CommandSource(Protocol):
     """Wanted motion over time; the control loop asks once a tick."""
 
-    def __call__(self, time: float) -> MotionCommand | None:
+    def __call__(self, time: float, /) -> MotionCommand | None:
         """The command at `time` (s since the start of the run), or None to end the run."""
         ...
 
