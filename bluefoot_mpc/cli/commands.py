@@ -17,6 +17,7 @@ from bluefoot_mpc.cli.arguments import (
     RunCommand,
     UrdfCommand,
 )
+from bluefoot_mpc.cli.deploy_arguments import DeployCommand
 from bluefoot_mpc.cli.doctor_arguments import DoctorCommand
 from bluefoot_mpc.cli.emulator_arguments import EmulatorCommand
 from bluefoot_mpc.cli.servo_arguments import ServoCommand
@@ -46,4 +47,5 @@ Command = (
     | Annotated[DoctorCommand, tyro.conf.subcommand("doctor")]
     | Annotated[StationCommand, tyro.conf.subcommand("station")]
     | Annotated[ValidateCommand, tyro.conf.subcommand("validate")]
+    | Annotated[DeployCommand, tyro.conf.subcommand("deploy")]
 )

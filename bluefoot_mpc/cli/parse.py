@@ -27,6 +27,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "doctor": (),
     "station": (),
     "validate": (),
+    "deploy": (),
 }
 """Commands, and the words that must follow them."""
 

@@ -135,7 +135,7 @@ def _objections(record: Record, code: Code, demand: Demand, mend: str) -> Iterat
         text = f"failed on {record.made}: {'; '.join(broken[:3])}{more}"
         yield _finding(text, f"Change the configuration until it passes: {mend}")
     if table["code"] != code.as_plain():
-        changed = "; ".join(_code_changes(table["code"], code.as_plain()))
+        changed = _some(list(_code_changes(table["code"], code.as_plain())))
         yield _finding(f"the code is not the one of {record.made}: {changed}", f"Validate again: {mend}")
     if not plan.is_full:
         what = "it was a quick one" if plan.quick else f"{plan.seeds} seed(s), {LEAST_SEEDS} are needed"
@@ -177,17 +177,23 @@ def _unvalidated(files: list[Path], folder: Path, subject: Subject, mend: str) -
     text = f"this configuration ({subject.sha256[:16]}) was never validated: no record in {folder}"
     if nearest is not None:
         changes, record = nearest
-        more = f" and {len(changes) - _MOST_NAMED} more" if len(changes) > _MOST_NAMED else ""
-        text = f"changed since the record of {record.made}: {'; '.join(changes[:_MOST_NAMED])}{more}"
+        text = f"changed since the record of {record.made}: {_some(changes)}"
     return _finding(text, f"Validate it: {mend}")
 
 
 def _code_changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
-    for change in differences(old, new):
-        if change.startswith("source"):
-            yield "a module of the package or a model that ships was changed"
-        else:
-            yield change.removeprefix("versions.")
+    """Files and versions that are not the same."""
+    for name in sorted({*old["files"], *new["files"]}):
+        if old["files"].get(name) != new["files"].get(name):
+            yield name
+    for key in ("package", "versions"):
+        yield from differences({key: old[key]}, {key: new[key]})
+
+
+def _some(changes: list[str]) -> str:
+    """The first of many changes, and how many there are besides."""
+    more = f" and {len(changes) - _MOST_NAMED} more" if len(changes) > _MOST_NAMED else ""
+    return "; ".join(changes[:_MOST_NAMED]) + more
 
 
 def _finding(text: str, mend: str) -> Finding:

@@ -111,7 +111,8 @@ def own_hash(table: Mapping[str, Any]) -> str:
 
 def record_file(folder: Path, table: Mapping[str, Any]) -> Path:
     """Where a record belongs: the hash of the configuration, then that of code and plan."""
-    run = table_hash({"code": table["code"], "plan": table["plan"]})
+    code = {key: table["code"][key] for key in ("package", "source", "versions")}
+    run = table_hash({"code": code, "plan": table["plan"]})
     return folder / f"{table['subject_sha256'][:_SHORT]}-{run[:8]}.json"
 
 

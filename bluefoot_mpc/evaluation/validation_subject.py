@@ -14,8 +14,10 @@ from typing import Any
 
 import orjson
 
+import bluefoot_mpc
 from bluefoot_mpc.evaluation.battery import source_hash
 from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.model.resources import models_folder
 from bluefoot_mpc.runtime.versions import installed_versions
 from bluefoot_mpc.scenarios import RunOptions
 from bluefoot_mpc.scenarios.base import Scenario
@@ -86,20 +88,20 @@ class Code:
         package: version of this package.
         source: hash of its modules and models.
         versions: of the packages that can change a command.
+        files: hash of every module and model, to name those that changed.
     """
 
     package: str
     source: str
     versions: Mapping[str, str]
+    files: Mapping[str, str]
 
     def as_plain(self) -> dict[str, Any]:
         """Plain values, for a record."""
-        return {"package": self.package, "source": self.source, "versions": dict(self.versions)}
-
-    @property
-    def sha256(self) -> str:
-        """Hash of all of it."""
-        return table_hash(self.as_plain())
+        return {
+            "package": self.package, "source": self.source, "versions": dict(self.versions),
+            "files": dict(self.files),
+        }  # fmt: skip
 
 
 def code_now() -> Code:
@@ -110,7 +112,8 @@ def code_now() -> Code:
             versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             continue
-    return Code(package=installed_versions()["bluefoot-mpc"], source=source_hash(), versions=versions)
+    package = installed_versions()["bluefoot-mpc"]
+    return Code(package=package, source=source_hash(), versions=versions, files=_file_hashes())
 
 
 def subject_of(options: RunOptions, scenario: type[Scenario] = Stand) -> Subject:
@@ -167,11 +170,22 @@ def _without_bench(options: RunOptions) -> Iterator[RunOptions]:
         yield dataclasses.replace(options, config=file)
 
 
+def _file_hashes() -> dict[str, str]:
+    """Short hash of everything that `source_hash` is of, by path."""
+    package, models = Path(bluefoot_mpc.__file__).parent, models_folder()
+    places = [(package, "*.py"), (models, "*.toml")]
+    return {
+        str(Path(folder.name) / file.relative_to(folder)): _file_hash(file)[:12]
+        for folder, pattern in places
+        for file in sorted(folder.rglob(pattern))
+    }
+
+
 def _file_hash(file: Path) -> str:
     try:
         return hashlib.sha256(file.read_bytes()).hexdigest()
     except OSError as error:
-        raise ConfigurationError(f"cannot read the weights {file}: {error.strerror or error}") from error
+        raise ConfigurationError(f"cannot read {file}: {error.strerror or error}") from error
 
 
 def _plain(value: Any) -> Any:
