@@ -3,7 +3,8 @@
 Staged, and pure but for its memory: a set-point that is late is held; one that
 stays away makes the guard lower the body by itself, with no controller, and
 then switch the torque off. What has begun is not called off by a set-point
-that comes too late: torque returns only by arming anew.
+that comes too late: torque returns only by arming anew. A guard that was away itself (a
+halted program) does not go on either: others have switched the robot off meanwhile.
 """
 
 from __future__ import annotations
@@ -25,11 +26,12 @@ class GuardConfig:
 
     hold_after: float = 0.1  # s without a new set-point until the last goals are held
     sink_after: float = 0.5  # s, the same until the guard lowers the robot by itself
+    off_after: float = 0.5  # s between two calls after which others have switched the robot off
     longest_step: float = 0.1  # s that goals move on at most between two calls, however late the second is
     sink: SinkConfig = field(default_factory=SinkConfig)
 
     def __post_init__(self) -> None:
-        require_positive(hold_after=self.hold_after, longest_step=self.longest_step)
+        require_positive(hold_after=self.hold_after, off_after=self.off_after, longest_step=self.longest_step)
         if self.sink_after <= self.hold_after:
             raise ConfigurationError(
                 f"sink_after = {self.sink_after:g} must be longer than hold_after = {self.hold_after:g} (s)"
@@ -112,9 +114,9 @@ def advance(
     # A stalled adapter, or a first call, must not make the goals jump.
     dt = min(max(step, 0.0), config.longest_step) if math.isfinite(step) else 0.0
     memory = replace(memory, now=inputs.now)
-    if inputs.emergency or memory.state is GuardState.OFF:
-        reason = memory.reason if memory.state is GuardState.OFF else inputs.emergency
-        return replace(memory, state=GuardState.OFF, sink=None, reason=reason)
+    off = _why_off(memory, inputs, step, config)
+    if off:
+        return replace(memory, state=GuardState.OFF, sink=None, reason=off)
     if memory.sink is not None:
         return _sinking(memory, memory.sink, sit, dt, config)
     if inputs.age <= config.hold_after and inputs.setpoint is not None:
@@ -128,6 +130,18 @@ def advance(
         return replace(memory, state=GuardState.OFF)
     begun = Sink(goal=memory.sent.position, torque=memory.sent.torque_limit)
     return _sinking(memory, begun, sit, dt, config)
+
+
+def _why_off(memory: GuardMemory, inputs: GuardInputs, step: float, config: GuardConfig) -> str:
+    """Why there is no torque at all; empty where there may be."""
+    if memory.state is GuardState.OFF:
+        return memory.reason
+    if inputs.emergency:
+        return inputs.emergency
+    if step > config.off_after:
+        # Watchdog process and power board have acted: a goal now would switch limp servos on again.
+        return f"the bus thread was away for {step:.1f} s: the robot stays off"
+    return ""
 
 
 def _sinking(

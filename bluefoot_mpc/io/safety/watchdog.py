@@ -168,6 +168,8 @@ class Watch:
     def _fire(self, why: str) -> None:
         self._fired = True
         log.error("%s: torque is switched off", why)
+        # Waits for the program where that one is halted: the first thing that it hears.
+        self._tell()
         end = time.monotonic() + RETRY
         while not switch_off(self._ports):
             if time.monotonic() > end:
@@ -180,6 +182,9 @@ class Watch:
     def _insist(self) -> None:
         """The program is back: whatever it has written meanwhile, torque stays off, and it is told."""
         _rounds(self._ports)
+        self._tell()
+
+    def _tell(self) -> None:
         with contextlib.suppress(OSError):
             self._channel.send(FIRED, socket.MSG_DONTWAIT)
 

@@ -60,14 +60,14 @@ def test_it_holds_the_last_goals_then_lowers_them_slowly(guard):
 def test_a_set_point_in_time_ends_the_hold(guard):
     starve(guard, 0.4)
     assert guard.state is GuardState.HOLD
-    assert guard.step(101.0, 0.0, goal(0.4)).state is GuardState.SEND
+    assert guard.step(100.4, 0.0, goal(0.4)).state is GuardState.SEND
 
 
 def test_a_set_point_too_late_changes_nothing(guard):
     starve(guard, 0.8)
     assert guard.state is GuardState.SINK
     for k in range(300):
-        action = guard.step(101.0 + k * PERIOD, 0.0, goal(0.9))
+        action = guard.step(100.8 + k * PERIOD, 0.0, goal(0.9))
         assert action.state in (GuardState.SINK, GuardState.OFF)
     assert guard.state is GuardState.OFF
 
@@ -75,8 +75,16 @@ def test_a_set_point_too_late_changes_nothing(guard):
 def test_a_stalled_adapter_does_not_make_goals_jump(guard):
     starve(guard, 0.6)
     before = guard.memory.sent.position
-    after = guard.step(200.0, 100.0, goal(0.3)).command.position
+    after = guard.step(guard.memory.now + 0.4, 1.0, goal(0.3)).command.position
     assert np.abs(after - before).max() <= 0.8 * GuardConfig().longest_step + 1e-9
+
+
+@pytest.mark.parametrize("before", [0.0, 0.3, 0.8])
+def test_a_guard_that_was_away_itself_does_not_switch_limp_servos_on(guard, before):
+    starve(guard, before + PERIOD)
+    action = guard.step(guard.memory.now + 0.6, 0.0, goal(0.3))
+    assert (action.state, action.command) == (GuardState.OFF, None)
+    assert "was away for 0.6 s" in action.reason
 
 
 @pytest.mark.parametrize("now", [50.0, float("nan")])
