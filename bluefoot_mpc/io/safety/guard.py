@@ -20,6 +20,10 @@ from bluefoot_mpc.settings import require_positive
 from bluefoot_mpc.types import FloatArray, JointCommand
 
 
+EMERGENCY = "emergency stop"
+"""Reason of an emergency stop that nobody gave a reason for."""
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class GuardConfig:
     """When the guard steps in."""
@@ -188,7 +192,7 @@ class Guard:
 
     def emergency(self, reason: str) -> None:
         """From the next cycle on no torque, until `reset`."""
-        self._emergency = self._emergency or reason
+        self._emergency = self._emergency or reason or EMERGENCY
 
     def step(self, now: float, age_of_setpoint: float, setpoint: JointCommand | None) -> GuardAction:
         """What to write in this bus cycle.

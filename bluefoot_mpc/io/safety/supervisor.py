@@ -19,6 +19,7 @@ from bluefoot_mpc.io.safety import sink, states
 from bluefoot_mpc.io.safety.config import SafetyConfig
 from bluefoot_mpc.io.safety.faults import Fault, FaultBook, Response
 from bluefoot_mpc.io.safety.gate import CommandGate, capped, unusable_joints, usable
+from bluefoot_mpc.io.safety.guard import EMERGENCY
 from bluefoot_mpc.io.safety.health import Watched
 from bluefoot_mpc.io.safety.monitoring import Monitors
 from bluefoot_mpc.io.safety.sink import Sink
@@ -152,7 +153,7 @@ class SafetySupervisor:
         """
         if not self._emergency:
             log.error("safety: emergency stop: %s", reason)
-        self._emergency = self._emergency or reason
+        self._emergency = self._emergency or reason or EMERGENCY
         self.robot.stop()
 
     def interrupt(self) -> None:

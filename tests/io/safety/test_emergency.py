@@ -71,6 +71,14 @@ def test_the_first_reason_stays():
     assert supervisor.request.reasons == ("emergency stop: red button",)
 
 
+def test_an_emergency_stop_needs_no_reason():
+    fake, supervisor = in_state(SafetyState.ACTIVE)
+    supervisor.emergency("")
+    play(supervisor, 0.1)
+    assert supervisor.state is SafetyState.EMERGENCY
+    assert fake.latched
+
+
 def test_torque_goes_before_the_call_returns_not_with_the_next_step():
     fake, supervisor = in_state(SafetyState.ACTIVE)
     supervisor.emergency("red button")

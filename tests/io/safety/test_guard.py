@@ -142,6 +142,12 @@ def test_an_emergency_overrides_every_stage_until_reset(guard, before):
     assert guard.step(120.0, 0.0, goal(0.3)).state is GuardState.SEND
 
 
+def test_an_emergency_needs_no_reason(guard):
+    guard.emergency("")
+    action = guard.step(0.0, 0.0, goal(0.3))
+    assert (action.state, action.reason) == (GuardState.OFF, "emergency stop")
+
+
 cycles = st.lists(
     st.tuples(
         st.floats(allow_nan=True, allow_infinity=True), st.floats(allow_nan=True, allow_infinity=True),
