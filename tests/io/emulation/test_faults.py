@@ -1,4 +1,6 @@
 import math
+import re
+from pathlib import Path
 
 import pytest
 
@@ -341,3 +343,14 @@ def test_a_fault_of_a_servo_that_is_not_there_is_refused():
         Case(Fault(kind="register", servo=1, address=10, value=1))
     with pytest.raises(ConfigurationError, match="does not fit"):
         Case(Fault(kind="register", servo=1, address=5, value=300))
+
+
+def test_the_page_about_the_emulator_is_right(tmp_path):
+    page = (Path(__file__).parents[3] / "docs" / "emulator.md").read_text(encoding="utf-8")
+    examples = dict(re.findall(r"```(toml|python)\n(.*?)```", page, re.DOTALL))
+    path = tmp_path / "faults.toml"
+    path.write_text(examples["toml"])
+    assert len(FaultPlan.load(path).faults) == 4
+    exec(examples["python"], {})
+    table = page[page.index("| kind |") :]
+    assert re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE) == list(KINDS)
