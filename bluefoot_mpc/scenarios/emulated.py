@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import ArrayLike
+
 from bluefoot_mpc.io.board.driver import SensorBoard
 from bluefoot_mpc.io.calibration import Calibration
 from bluefoot_mpc.io.clock import PacedClock, VirtualClock
@@ -15,16 +17,19 @@ from bluefoot_mpc.io.emulation.board import EmulatedBoard
 from bluefoot_mpc.io.emulation.device import Device
 from bluefoot_mpc.io.emulation.faults import FaultPlan, LineName
 from bluefoot_mpc.io.emulation.faults_line import FaultyLine
+from bluefoot_mpc.io.emulation.lidar import EmulatedLidar
 from bluefoot_mpc.io.emulation.memory_link import MemoryLink
 from bluefoot_mpc.io.emulation.servo_line import ServoLine
+from bluefoot_mpc.io.lidar.driver import Lidar
 from bluefoot_mpc.io.servo_robot.config import DevicesConfig
-from bluefoot_mpc.io.servo_robot.making import BOARD_BAUD, drivers
+from bluefoot_mpc.io.servo_robot.making import BOARD_BAUD, LIDAR_BAUD, drivers
 from bluefoot_mpc.io.servo_robot.robot import ServoRobot
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.scenarios.config import Resolved
 from bluefoot_mpc.scenarios.robots import RunRobot
 from bluefoot_mpc.sim.body import Posture
 from bluefoot_mpc.sim.config import SimConfig
+from bluefoot_mpc.sim.lidar import RaycastLidar
 from bluefoot_mpc.sim.plant import SimPlant
 from bluefoot_mpc.types import N_JOINTS, BoolArray, ImuBatch
 
@@ -71,6 +76,23 @@ class PlantBoard:
             line.power(on, self._now)
 
 
+class PlantLidar:
+    """What the emulated LIDAR sees of the simulated world.
+
+    Args:
+        plant: the simulated body.
+        lidar: on its trunk.
+    """
+
+    def __init__(self, plant: SimPlant, lidar: RaycastLidar) -> None:
+        self._plant, self._lidar = plant, lidar
+
+    def scan(self, time: float) -> ArrayLike:
+        """(682,) mm of a sweep that ends at `time` (s)."""
+        self._plant.advance(time)
+        return self._lidar.scan(time)
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class EmulatedRobot:
     """Emulated devices with one simulated body behind them.
@@ -79,12 +101,14 @@ class EmulatedRobot:
         plant: the body.
         lines: servos, one line for each port.
         board: sensor and power board.
+        lidar: None without one.
         faults: what is to go wrong.
     """
 
     plant: SimPlant
     lines: tuple[ServoLine, ...]
     board: EmulatedBoard
+    lidar: EmulatedLidar | None
     faults: FaultPlan
 
     def servo_devices(self, start: float = 0.0) -> list[Device]:
@@ -94,6 +118,10 @@ class EmulatedRobot:
     def board_device(self, start: float = 0.0) -> Device:
         """Far end of the board's port."""
         return self._faulty(self.board, "board", start)
+
+    def lidar_device(self, start: float = 0.0) -> Device | None:
+        """Far end of the LIDAR's port; None without one."""
+        return None if self.lidar is None else self._faulty(self.lidar, "lidar", start)
 
     def report(self) -> dict[str, Any]:
         """What the devices saw of their driver: plain values."""
@@ -128,7 +156,15 @@ def emulate(
         plant=plant,
         lines=(line,),
         board=EmulatedBoard(PlantBoard(plant, (line,))),
+        lidar=_lidar(model, plant, seed) if config.emulate_lidar else None,
         faults=FaultPlan.load(Path(config.faults)) if config.faults else FaultPlan(),
+    )
+
+
+def _lidar(model: RobotModel, plant: SimPlant, seed: int) -> EmulatedLidar:
+    mount = model.parameters.sensors.lidar
+    return EmulatedLidar(
+        PlantLidar(plant, RaycastLidar(plant.model, plant.data, plant.trunk, mount, seed=seed))
     )
 
 
@@ -146,7 +182,10 @@ def make_emulated(resolved: Resolved, model: RobotModel, sitting: Posture, paced
     clock = PacedClock() if paced else VirtualClock()
     servos = [MemoryLink(device, clock, config.baud, "emulated servos") for device in parts.servo_devices()]
     board = SensorBoard(MemoryLink(parts.board_device(), clock, BOARD_BAUD, "emulated board"), clock)
-    robot = ServoRobot(drivers(servos, clock, Calibration.nominal(model.parameters), board), clock, config)
+    lidar = parts.lidar_device()
+    scanner = None if lidar is None else Lidar(MemoryLink(lidar, clock, LIDAR_BAUD, "emulated LIDAR"), clock)
+    devices = drivers(servos, clock, Calibration.nominal(model.parameters), board, scanner)
+    robot = ServoRobot(devices, clock, config)
     return RunRobot(
         robot=robot, truth=parts.plant.truth, drawn=parts.plant.drawn, devices=parts.report, parts=parts
     )

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from typing import Any
 
 import orjson
@@ -109,9 +110,10 @@ def make_emulated_live(resolved: Resolved, model: RobotModel, sitting: Posture) 
         joints=sitting.joints.tolist(), height=sitting.height, zero=zero,
     )  # fmt: skip
     process = EmulatorProcess(order)
+    config = replace(resolved.stages.devices, lidar_port=process.ports["lidar"] or "")
     try:
         robot = live_robot(
-            resolved.stages.devices, Calibration.nominal(model.parameters), MonotonicClock(zero),
+            config, Calibration.nominal(model.parameters), MonotonicClock(zero),
             process.ports["servos"], process.ports["board"], on_close=process.close,
         )  # fmt: skip
     except BaseException:

@@ -21,7 +21,7 @@ import orjson
 from bluefoot_mpc.io.clock import MonotonicClock
 from bluefoot_mpc.io.emulation.pty_line import PtyLine
 from bluefoot_mpc.io.servo_robot.config import DevicesConfig
-from bluefoot_mpc.io.servo_robot.making import BOARD_BAUD
+from bluefoot_mpc.io.servo_robot.making import BOARD_BAUD, LIDAR_BAUD
 from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.codec import encode
@@ -80,7 +80,12 @@ def serve(order: Order, until: threading.Event) -> None:
             for device in robot.servo_devices(start)
         ]
         board = stack.enter_context(PtyLine(robot.board_device(start), BOARD_BAUD, lock=lock, clock=clock))
-        _tell({"servos": [line.port for line in servos], "board": board.port, "drawn": robot.plant.drawn})
+        lidar = robot.lidar_device(start)
+        scanner = None
+        if lidar is not None:
+            scanner = stack.enter_context(PtyLine(lidar, LIDAR_BAUD, lock=lock, clock=clock)).port
+        _tell({"servos": [line.port for line in servos], "board": board.port, "lidar": scanner,
+               "drawn": robot.plant.drawn})  # fmt: skip
         next_truth = start
         while not until.wait(_BEAT):
             now = clock.now()

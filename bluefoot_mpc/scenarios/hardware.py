@@ -13,13 +13,11 @@ from bluefoot_mpc.io.lidar.driver import Lidar
 from bluefoot_mpc.io.serial_link import SerialLink
 from bluefoot_mpc.io.servo_robot.config import DevicesConfig
 from bluefoot_mpc.io.servo_robot.live import LiveRobot
-from bluefoot_mpc.io.servo_robot.making import BOARD_BAUD, drivers
+from bluefoot_mpc.io.servo_robot.making import BOARD_BAUD, LIDAR_BAUD, drivers
 from bluefoot_mpc.io.servo_robot.port_watchdog import PortWatchdog
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.scenarios.config import Resolved
 from bluefoot_mpc.scenarios.robots import RunRobot
-
-LIDAR_BAUD = 115_200
 
 
 def make_hardware(resolved: Resolved, model: RobotModel) -> RunRobot:

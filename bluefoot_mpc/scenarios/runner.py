@@ -55,7 +55,7 @@ class Presentation:
     """How a run looks while it happens.
 
     Attributes:
-        paced: one second of the run takes a second at least; None: only with the live view.
+        paced: one second of the run takes a second at least; None: only with the live view or a station.
         progress: a bar on the terminal, where there is one.
     """
 
@@ -140,7 +140,9 @@ def run_commanded(
         LogError: the log cannot be written.
     """
     presentation = presentation or Presentation()
-    paced = options.view if presentation.paced is None else presentation.paced
+    # Who looks on, or commands, does so in real time.
+    watched = options.view or options.station is not None
+    paced = watched if presentation.paced is None else presentation.paced
     made = _prepare(resolved, paced)
     on = made.on
     folder = make_folder(options, resolved.run.scenario)
@@ -205,6 +207,12 @@ def _station(
 ) -> Iterator[StationedRun | None]:
     """The ground station of a run, where one is wanted."""
     if options.station is None:
+        if not resolved.scenario.scripted:
+            raise ConfigurationError(
+                f"nothing commands '{resolved.run.scenario}': name the station with --station ADDRESS "
+                "(udp:127.0.0.1:14550 for bluefoot station on this machine), or give it a script: "
+                "--set 'scenario.script=\"walk 5 forward=0.06; sit 2\"'"
+            )
         yield None
         return
     # MAVLink takes a while to load, and most runs need none.
@@ -213,8 +221,7 @@ def _station(
 
     with StationLink(options.station) as link:
         # A station leads only where nothing else does.
-        own = source if resolved.scenario.scripted else None
-        yield StationedRun(link, own, powered=on.rests)
+        yield StationedRun(link, source, leads=not resolved.scenario.scripted, powered=on.rests)
 
 
 @contextmanager

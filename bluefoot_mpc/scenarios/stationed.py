@@ -39,13 +39,16 @@ class StationedRun:
 
     Args:
         link: the station.
-        own: who commands; None: the station does.
+        own: the run's own commands; when they end, so does the run.
+        leads: True where the station commands, as long as the run's own commands last.
         powered: True for robots that are disarmed for good by a stop: the run then ends.
     """
 
-    def __init__(self, link: StationLink, own: CommandSource | None = None, *, powered: bool = False) -> None:
-        self._link, self._powered = link, powered
-        self._source: CommandSource = own or LinkSource(link)
+    def __init__(
+        self, link: StationLink, own: CommandSource, *, leads: bool = False, powered: bool = False
+    ) -> None:
+        self._link, self._own, self._powered = link, own, powered
+        self._led = LinkSource(link) if leads else None
         self._supervisor: Supervised | None = None
 
     def attach(self, supervisor: Supervised) -> None:
@@ -60,7 +63,8 @@ class StationedRun:
             link.arm_done(self._refusal())
         if link.stop_requested or link.emergency_requested:
             return None if self._powered and self._state in LIMP else MotionCommand(mode=Mode.OFF)
-        return self._source(time)
+        motion = self._own(time)
+        return motion if motion is None or self._led is None else self._led(time)
 
     def observe(self, frame: SensorFrame, output: ControlOutput, truth: TruthSample | None) -> None:
         """Publish a tick; returns at once."""

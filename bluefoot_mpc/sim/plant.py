@@ -62,6 +62,11 @@ class SimPlant(SimBody):
         self._truth.start_frame()
         return self._frame
 
+    @property
+    def trunk(self) -> int:
+        """MuJoCo's number of the trunk."""
+        return self._world.trunk
+
     def begin(self, time: float) -> None:
         """Let the simulation's zero be at `time` (s) of whoever asks."""
         self._zero = time

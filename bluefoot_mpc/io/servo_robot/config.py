@@ -30,6 +30,7 @@ class DevicesConfig:
     patience: float = 0.005  # s that a cycle waits for a set-point that is late
     arming_voltage: float = 10.5  # V, at rest; with less the robot is not armed, for it would soon sit down
     connect_time: float = 2.0  # s that devices get to send their first data
+    emulate_lidar: bool = False  # an emulated robot has a LIDAR too
     faults: str = ""  # file of faults to inject; emulator only
 
     def __post_init__(self) -> None:

@@ -18,6 +18,8 @@ from bluefoot_mpc.io.servo_robot.devices import Devices
 
 BOARD_BAUD = 115_200
 """bit/s of the sensor board's port (docs/board-protocol.md)."""
+LIDAR_BAUD = 115_200
+"""bit/s of the LIDAR's port; over USB it means nothing."""
 
 
 def drivers(
