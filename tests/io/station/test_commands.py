@@ -11,6 +11,7 @@ from bluefoot_mpc.io.station.commands import (
     DENIED,
     UNSUPPORTED,
     CommandInbox,
+    Wishes,
     read_sticks,
     write_sticks,
 )
@@ -191,7 +192,7 @@ def test_modes_and_gaits(inbox, number, mode):
         (1.0, 2.0, 3.0),
         (1.0, 2.0, 1.0, 1e-3),
     ],
-)
+)  # fmt: skip
 def test_modes_that_mean_nothing_are_denied(inbox, parameters):
     assert inbox.execute(command(MODE, *parameters)) == DENIED
     assert inbox.mode is Mode.STAND
@@ -231,7 +232,7 @@ def test_an_emergency_is_passed_on_at_once(inbox, order):
 )
 def test_arming_has_no_short_cut_and_no_near_miss(inbox, parameters):
     assert inbox.execute(command(ARM, *parameters)) == DENIED
-    assert not (inbox.wishes.arm or inbox.wishes.stop or inbox.wishes.emergency)
+    assert inbox.wishes == Wishes()
 
 
 def test_pause_stands_still(inbox):
