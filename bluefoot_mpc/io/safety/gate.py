@@ -14,8 +14,8 @@ _ONES = np.ones(N_JOINTS)
 
 JUMP = 0.5
 """rad that a goal may be away from the last one before people are told that it was slowed down."""
-BEYOND = 0.02
-"""rad that a goal may lie outside the limits before people are told that it was moved."""
+BEYOND = 0.1
+"""rad that a goal may lie outside the limits before people are told; a limp joint may be found there."""
 
 
 class CommandGate:

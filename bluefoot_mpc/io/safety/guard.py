@@ -19,7 +19,6 @@ from bluefoot_mpc.io.safety.sink import Sink, SinkConfig
 from bluefoot_mpc.settings import require_positive
 from bluefoot_mpc.types import FloatArray, JointCommand
 
-
 EMERGENCY = "emergency stop"
 """Reason of an emergency stop that nobody gave a reason for."""
 

@@ -24,7 +24,7 @@ from bluefoot_mpc.io.safety.health import Watched
 from bluefoot_mpc.io.safety.monitoring import Monitors
 from bluefoot_mpc.io.safety.sink import Sink
 from bluefoot_mpc.io.safety.states import Checks, Inputs, Machine, SafetyState
-from bluefoot_mpc.types import N_JOINTS, FloatArray, JointCommand, SafetyRequest, SensorFrame
+from bluefoot_mpc.types import FloatArray, JointCommand, SafetyRequest, SensorFrame
 
 log = logging.getLogger(__name__)
 
@@ -274,9 +274,8 @@ class SafetySupervisor:
         self._require_calm(None)
 
     def _ramp_up(self, frame: SensorFrame) -> SensorFrame:
-        hold = JointCommand(
-            position=frame.joint_position.copy(), speed=np.zeros(N_JOINTS), torque_limit=np.ones(N_JOINTS)
-        )
+        # A limp joint may lie a little beyond its limits: it is brought to them as torque comes.
+        hold = self._gate.held()
         while self._machine.state is SafetyState.ARMING:
             frame = self.robot.step(self.check(hold))
             self._watch(frame)

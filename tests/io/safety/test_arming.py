@@ -53,6 +53,14 @@ def test_arming_goes_in_order_and_holds_what_it_found(supervisor, fake):
     assert frame.time == pytest.approx(fake.time)
 
 
+def test_a_joint_that_lies_beyond_its_limit_is_held_at_it(supervisor, fake):
+    fake.position = np.where(np.arange(16) == 3, 1.05, 0.3)
+    supervisor.reset()
+    for command in fake.sent:
+        np.testing.assert_array_equal(command.position, np.where(np.arange(16) == 3, 1.0, 0.3))
+    assert supervisor.warnings == ()
+
+
 def test_refusals_keep_the_torque_off_and_are_all_told(supervisor, fake):
     warning = Finding(part="port", text="no latency timer", severity=Severity.WARNING)
     fake.findings = (refusal("no reply"), warning, replace(refusal("model is 18"), part="servo 9"))
