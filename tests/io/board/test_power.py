@@ -78,8 +78,9 @@ def test_cuts_that_are_lost_are_repeated_and_heartbeats_stop():
     assert bench.robot.powered
     bench.run(0.1)
     bench.link.out = False
-    bench.run(0.6)
+    bench.run(0.2)
     assert not bench.robot.powered
+    assert bench.board.supply.cut is CutReason.COMMAND
     before = bench.driver.statistics.heartbeats
     bench.run(0.2)
     assert bench.driver.statistics.heartbeats == before
