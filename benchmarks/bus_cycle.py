@@ -146,16 +146,31 @@ def random_loss(cycles, share):
     return {"median_ms": float(np.median(times[:, 0])), "worst_ms": float(times[:, 0].max()), "fresh": fresh}
 
 
+MANY_HEADERS = bytes(0xFF if value < 100 else value % 8 for value in range(256))
+
+
+def random_stream(rng):
+    """Up to 64 bytes: noise, half of it rich in headers, mostly with a packet inside, often a spoilt one."""
+    noise = rng.randbytes(rng.randrange(65))
+    if rng.random() < 0.5:
+        noise = noise.translate(MANY_HEADERS)
+    if rng.random() < 0.7:
+        inside = bytearray(
+            status_packet(rng.randrange(254), rng.randrange(128), rng.randbytes(rng.randrange(9)))
+        )
+        if rng.random() < 0.5:
+            inside[rng.randrange(len(inside))] ^= 1 << rng.randrange(8)
+        cut = rng.randrange(len(noise) + 1)
+        noise = noise[:cut] + inside + noise[cut:]
+    return noise[:64]
+
+
 def fuzz(streams):
-    """Random streams of up to 64 bytes, half of them with a packet inside: every byte accounted for."""
+    """Random streams in two pieces: wrong are those of which a byte is lost, or a bad checksum is taken."""
     rng = random.Random(2)
     begun, accepted, wrong = time.perf_counter(), 0, 0
     for _ in range(streams):
-        stream = rng.randbytes(rng.randrange(65))
-        if rng.random() < 0.5:
-            inside = status_packet(rng.randrange(254), rng.randrange(128), rng.randbytes(rng.randrange(9)))
-            cut = rng.randrange(len(stream) + 1)
-            stream = (stream[:cut] + inside + stream[cut:])[:64]
+        stream = random_stream(rng)
         parser, rebuilt = StatusParser(), b""
         cut = rng.randrange(len(stream) + 1)
         for item in [*parser.feed(stream[:cut]), *parser.feed(stream[cut:]), *parser.flush()]:
@@ -164,7 +179,7 @@ def fuzz(streams):
                 rebuilt += status_packet(item.id, item.error, item.parameters)
             elif item.kind is ProblemKind.GARBAGE:
                 rebuilt += item.data
-        # Built anew with a right checksum: equal bytes mean that no wrong one was taken and none was lost.
+        # Packets are built anew with a right checksum: equal bytes mean that each was right as it came.
         wrong += rebuilt != stream
     return {
         "streams": streams,

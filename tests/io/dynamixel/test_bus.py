@@ -102,6 +102,25 @@ def test_a_late_reply_is_not_taken_for_a_later_one(delay):
         line.clock.sleep_until(line.clock.now() + 0.0025)
 
 
+def test_what_waits_before_a_request_is_not_its_answer():
+    bus, line = fake_bus()
+    for _ in range(3):
+        line.inject(status_packet(3, 0, b"\x01\x01"), line.clock.now() + 0.001)
+        line.clock.sleep_until(line.clock.now() + 0.002)
+        assert bus.read(3, "present_position") == 503
+    assert bus.statistics.stale_bytes == 24
+
+
+def test_half_a_packet_before_a_request_does_not_swallow_its_answer():
+    bus, line = fake_bus(tries=1)
+    for _ in range(3):
+        line.inject(b"\xff\xff\x03\x20\x00\x01", line.clock.now() + 0.001)
+        line.clock.sleep_until(line.clock.now() + 0.002)
+        begun = line.clock.now()
+        assert bus.read(3, "present_position") == 503
+        assert line.clock.now() - begun == pytest.approx(16e-5)
+
+
 def test_a_late_acknowledgement_does_not_stand_for_another_write():
     bus, line = fake_bus(tries=1)
     line.change = lambda servo, reply: [(0.06, reply)]
