@@ -258,6 +258,29 @@ def test_a_stalled_motor_becomes_an_overload_after_a_while(bench):
     bench.wait(1.0)
     assert bench.ask(1, PING) == status(1, OVERLOAD)
     assert bench[1].read(34, 2) == 0
+    bench.shafts.load = 0.0
+    assert bench.ask(1, PING) == status(1, OVERLOAD)  # it shows until the limit is rewritten
+    assert bench.ask(1, WRITE, 34, *low_high(900)) == status(1)
+    assert bench[1].read(34, 2) == 900
+
+
+def test_a_forced_overload_stays(bench):
+    bench.ask(1, WRITE, 30, *low_high(520))
+    bench[1].forced_overload = True
+    assert bench.ask(1, PING) == status(1, OVERLOAD)
+    assert bench.ask(1, WRITE, 34, *low_high(900)) == status(1, OVERLOAD)
+    assert bench[1].read(34, 2) == 0
+    bench[1].forced_overload = False
+    assert bench.ask(1, WRITE, 34, *low_high(900)) == status(1)
+    assert bench[1].read(34, 2) == 900
+
+
+def test_an_overload_that_does_not_shut_down_passes(bench):
+    bench.ask(1, WRITE, 18, 0)
+    bench[1].forced_overload = True
+    assert bench.ask(1, PING) == status(1, OVERLOAD)
+    bench[1].forced_overload = False
+    assert bench.ask(1, PING) == status(1)
 
 
 def test_moving(bench):
@@ -275,6 +298,7 @@ def test_power_takes_the_ram_and_leaves_the_eeprom(bench):
     now = bench.clock.now()
     bench.line.power(False, now)
     assert not bench.shafts.drives[0].enabled
+    assert bench[1].read(24) == 0
     assert bench.ask(1, PING) == b""
     bench.shafts.angle = 0.1
     bench.line.power(True, bench.clock.now())

@@ -1,6 +1,7 @@
 """The emulator on a pseudo-terminal, driven by ROBOTIS' own client."""
 
 import os
+import sys
 import threading
 import time
 from pathlib import Path
@@ -32,6 +33,16 @@ def line():
 def pty(line):
     with PtyLine(line) as pty:
         yield pty
+
+
+@pytest.fixture(autouse=True)
+def _patience(monkeypatch):
+    """The client spins, in the same interpreter: let the emulator's thread come to its turn."""
+    monkeypatch.setattr("dynamixel_sdk.port_handler.LATENCY_TIMER", 150)
+    kept = sys.getswitchinterval()
+    sys.setswitchinterval(2e-4)
+    yield
+    sys.setswitchinterval(kept)
 
 
 @pytest.fixture
