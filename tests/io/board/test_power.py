@@ -76,7 +76,7 @@ def test_cuts_that_are_lost_are_repeated_and_heartbeats_stop():
     bench.link.out = True
     bench.driver.cut()
     assert bench.robot.powered
-    bench.run(0.1)
+    bench.run(0.06)
     bench.link.out = False
     bench.run(0.2)
     assert not bench.robot.powered
