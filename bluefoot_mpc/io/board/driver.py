@@ -110,14 +110,6 @@ class SensorBoard:
         report, config = self._power.report, self._config
         voltage = math.nan if report is None else report.voltage
         is_fresh = now - self._power.heard <= config.power_silence
-        faults = (
-            *((f"board link {self._link.name}: {self._lost}",) if self._lost else ()),
-            *((imu_fault,) if imu_fault else ()),
-            *switch_faults,
-            *(() if is_fresh else ("battery voltage: nothing heard from the board",)),
-            *self._power.faults(now),
-            *self._version_fault(),
-        )
         return BoardReadings(
             time=now,
             imu=self._imu.take(),
@@ -131,7 +123,7 @@ class SensorBoard:
             temperature=math.nan if report is None else report.temperature,
             power_on=self._power.power_on,
             connected=not self._lost,
-            faults=faults,
+            faults=self._faults(now, imu_fault, switch_faults),
             statistics=self.statistics,
         )
 
@@ -191,18 +183,19 @@ class SensorBoard:
         )
 
     def findings(self) -> tuple[Finding, ...]:
-        """The board's part of a check before arming; `poll` must have run for 0.2 s."""
-        readings = self.take()
+        """The board's part of a check before arming; takes no samples. `poll` must have run for 0.2 s."""
+        now = self._clock.now()
         part = f"board {self._link.name}"
-        if readings.faults:
+        faults = self._faults(now, self._imu.fault(now), self._switches.judge(now)[1])
+        if faults:
             mend = "Check the board's cable, supply and firmware (docs/board-protocol.md)"
             return tuple(
-                Finding(part=part, text=fault, mend=mend, severity=Severity.REFUSAL)
-                for fault in readings.faults
+                Finding(part=part, text=fault, mend=mend, severity=Severity.REFUSAL) for fault in faults
             )
         hello = self.hello
         version = "" if hello is None else f", firmware {hello.firmware[0]}.{hello.firmware[1]}"
-        return (Finding(part=part, text=f"answers, battery {readings.voltage:.2f} V{version}"),)
+        voltage = math.nan if self._power.report is None else self._power.report.voltage
+        return (Finding(part=part, text=f"answers, battery {voltage:.2f} V{version}"),)
 
     def close(self) -> None:
         """Give the port back. The board cuts the servos' power when heartbeats stay away. Idempotent."""
@@ -275,6 +268,17 @@ class SensorBoard:
         self._parser.reset()
         self._time.reset()
         self._switches.restart()
+
+    def _faults(self, now: float, imu: str, switches: tuple[str, ...]) -> tuple[str, ...]:
+        is_fresh = now - self._power.heard <= self._config.power_silence
+        return (
+            *((f"board link {self._link.name}: {self._lost}",) if self._lost else ()),
+            *((imu,) if imu else ()),
+            *switches,
+            *(() if is_fresh else ("battery voltage: nothing heard from the board",)),
+            *self._power.faults(now),
+            *self._version_fault(),
+        )
 
     def _version_fault(self) -> tuple[str, ...]:
         hello = self.hello

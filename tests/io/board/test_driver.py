@@ -282,7 +282,10 @@ def test_another_version_of_the_protocol_is_named():
 
 def test_a_healthy_board_is_one_good_finding():
     bench = after_start(Bench())
+    bench.clock.sleep_until(bench.clock.now() + 0.02)
+    bench.driver.poll()
     (found,) = bench.driver.findings()
+    assert len(bench.driver.take().imu.time) == 4, "a check takes no samples away"
     assert found.severity is Severity.OK
     assert "11.40 V, firmware 1.0" in found.text
 
