@@ -23,9 +23,10 @@ from bluefoot_mpc.io.dynamixel.codec import (
 )
 from bluefoot_mpc.io.dynamixel.errors import CorruptReplyError, NoReplyError, ServoFaultError
 from bluefoot_mpc.io.dynamixel.latch import Latch
+from bluefoot_mpc.io.dynamixel.replies import Outcome
 from bluefoot_mpc.io.dynamixel.statistics import BusStatistics
 from bluefoot_mpc.io.dynamixel.table import AX12A, RAM_START, Register
-from bluefoot_mpc.io.dynamixel.wire import BusConfig, Outcome, Wire
+from bluefoot_mpc.io.dynamixel.wire import BusConfig, Wire
 from bluefoot_mpc.io.link import Link
 
 __all__ = ["BusConfig", "ServoBus"]

@@ -22,9 +22,9 @@ from bluefoot_mpc.io.dynamixel.bus import ServoBus
 from bluefoot_mpc.io.dynamixel.errors import CommandRangeError
 from bluefoot_mpc.io.dynamixel.layout import ServoLayout
 from bluefoot_mpc.io.dynamixel.port_cycle import CycleConfig, PortCycle
+from bluefoot_mpc.io.dynamixel.replies import Outcome
 from bluefoot_mpc.io.dynamixel.servo_state import ServoState
 from bluefoot_mpc.io.dynamixel.table import AX12A
-from bluefoot_mpc.io.dynamixel.wire import Outcome
 from bluefoot_mpc.io.link import LinkLostError
 from bluefoot_mpc.types import N_JOINTS, BoolArray, FloatArray
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from bluefoot_mpc.io.dynamixel.bus import ServoBus
 from bluefoot_mpc.io.dynamixel.codec import BROADCAST_ID, HEADER, Instruction
 from bluefoot_mpc.io.dynamixel.errors import LatchedError
+from bluefoot_mpc.io.dynamixel.replies import Outcome
 from bluefoot_mpc.io.dynamixel.servo_state import Kind, ServoState
 from bluefoot_mpc.io.dynamixel.table import MOTION_START
-from bluefoot_mpc.io.dynamixel.wire import Outcome
 from bluefoot_mpc.io.link import LinkError, LinkLostError
 from bluefoot_mpc.settings import require_nonnegative, require_positive
 

@@ -1,39 +1,25 @@
 """One request and its answer on a half-duplex line: deadlines, and which bytes may be believed.
 
-Protocol 1.0 has no numbers in its packets, so a reply that comes late looks
-like the answer to a later request. Three things keep it out: whatever waits
-before a request is thrown away; a reply must have the length that was asked
-for, and as long as a lost reply may still come, no request expects the length
-of that one (`Wire.free_count`); and on a line whose bytes take their time, a
-reply cannot be there before request and reply have passed.
+Three things keep a late reply from being taken for the answer to a later
+request: whatever waits before a request is thrown away; lengths differ (see
+`replies`); and on a line whose bytes take their time, an answer cannot be there
+before request and answer have passed.
 """
 
 from __future__ import annotations
 
-import enum
 import threading
 from dataclasses import dataclass
 
 from bluefoot_mpc.io.clock import Clock
-from bluefoot_mpc.io.dynamixel.codec import (
-    OVERHEAD,
-    ErrorBit,
-    Instruction,
-    Problem,
-    ProblemKind,
-    StatusPacket,
-    StatusParser,
-)
+from bluefoot_mpc.io.dynamixel.codec import OVERHEAD, Instruction
 from bluefoot_mpc.io.dynamixel.errors import EepromRefusedError, LatchedError
 from bluefoot_mpc.io.dynamixel.latch import Latch, could_move, eeprom_address
-from bluefoot_mpc.io.dynamixel.statistics import BusStatistics
+from bluefoot_mpc.io.dynamixel.replies import NOW, Outcome, Replies
 from bluefoot_mpc.io.link import Link
 from bluefoot_mpc.settings import require_nonnegative, require_positive
 
 BITS_PER_BYTE = 10
-_PAST = 0.0
-"""A deadline that is always past: what waits is handed out at once."""
-
 _CHUNK = 256
 """Bytes asked of the link at once: more than any reply."""
 
@@ -46,19 +32,15 @@ _SOUND = 0xFD
 _LEAST_PATIENCE = 0.4
 """Share of the full patience below which haste never goes."""
 
-_SLACK_FACTOR, _SLACK_MARGIN, _SLACK_DECAY = 2.0, 5e-4, 0.99
-"""Haste leaves twice the slowest recent reply and 0.5 ms; "recent" fades by 1 % a reply."""
-
-_PAYLOAD_ERRORS = ErrorBit.RANGE | ErrorBit.INSTRUCTION | ErrorBit.CHECKSUM
+_SLACK_FACTOR, _SLACK_MARGIN = 2.0, 5e-4
+"""Haste leaves twice the lateness of the slowest recent reply, and 0.5 ms."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class BusConfig:
     """How long to wait for servos, and what may be written to them."""
 
-    latency: float = (
-        0.001  # s, most that the adapter holds a reply back; its latency timer where that is longer
-    )
+    latency: float = 0.001  # s, most that the adapter holds a reply back; its timer where that is longer
     margin: float = 0.002  # s, for the host's scheduling
     return_delay: float = 0.0  # s, longest return delay of the servos (factory: 500 µs, fits into `margin`)
     late_window: float = 0.15  # s, how long a lost reply may still come
@@ -72,18 +54,8 @@ class BusConfig:
         require_positive(margin=self.margin, tries=self.tries)
 
 
-class Outcome(enum.Enum):
-    """How a request stands."""
-
-    WAITING = "waiting"
-    OK = "ok"
-    LOST = "no reply"
-    CORRUPT = "corrupt reply"
-    REFUSED = "refused by the servo"
-
-
-class Wire:
-    """Puts requests on a link and finds their answers.
+class Wire(Replies):
+    """Puts requests on a link and waits for their answers.
 
     Args:
         link: the line.
@@ -92,31 +64,19 @@ class Wire:
         latch: checked with every packet.
 
     Attributes:
-        data: parameters of the last reply.
-        error: `ErrorBit`s of the last reply.
-        detail: what was wrong with the last reply, in words.
         deadline: s, when the wait for the request on its way ends.
         asked_at: s, when the request's last byte left, and the servo took its values.
-        doubted: IDs of servos whose last reply was followed by a different one; the reader clears it.
-        statistics: counts.
+        byte_time: s of one byte on the line.
+        patience: s that a reply may be late.
     """
 
     def __init__(self, link: Link, clock: Clock, config: BusConfig, latch: Latch) -> None:
-        self.link, self.clock, self.config, self.latch = link, clock, config, latch
-        self.statistics = BusStatistics()
-        self.data = b""
-        self.error = 0
-        self.detail = ""
+        super().__init__(clock, config.late_window, config.latency)
+        self.link, self.config, self.latch = link, config, latch
         self.deadline = self.asked_at = 0.0
-        self.doubted: list[int] = []
         self._lock = threading.Lock()
-        self._parser = StatusParser()
-        self._free_at = self._earliest = self._passed = 0.0
-        self._servo = -1
-        self._count = self._noise = 0
+        self._free_at = 0.0
         self._head = b""
-        self._last: tuple[int, bytes] = (-1, b"")
-        self._expected: dict[int, dict[int, float]] = {}
         self.tune()
 
     def tune(self) -> None:
@@ -125,7 +85,7 @@ class Wire:
         timer = getattr(self.link, "latency_timer_ms", lambda: None)()
         latency = max(self.config.latency, (timer or 0.0) * 1e-3)
         self.patience = latency + self.config.margin + self.config.return_delay
-        self._slack = latency
+        self.slack = latency
         self._is_paced = bool(getattr(self.link, "is_paced", False))
 
     def timeout(self, request: int, count: int) -> float:
@@ -140,7 +100,7 @@ class Wire:
         only costs time. The repetition waits in full, and so learns of slower
         replies.
         """
-        learnt = _SLACK_FACTOR * self._slack + _SLACK_MARGIN
+        learnt = _SLACK_FACTOR * self.slack + _SLACK_MARGIN
         return min(0.0, max(learnt, _LEAST_PATIENCE * self.patience) - self.patience)
 
     def put(self, packet: bytes) -> None:
@@ -159,8 +119,10 @@ class Wire:
                 address = eeprom_address(packet)
                 if address is not None and not self.config.allow_eeprom:
                     raise EepromRefusedError(self.link.name, address)
+            # The time before: who is delayed after writing must not take the reply for too early.
+            start = max(self.clock.now(), self._free_at)
             self.link.write(packet)
-            self._free_at = max(self.clock.now(), self._free_at) + len(packet) * self.byte_time
+            self._free_at = start + len(packet) * self.byte_time
 
     def begin(self, packet: bytes, servo: int, count: int, patience: float = 0.0) -> None:
         """Send a request.
@@ -174,16 +136,14 @@ class Wire:
         Raises:
             LatchedError, EepromRefusedError, LinkLostError: as `put`.
         """
-        stale = self.link.read(_CHUNK, _PAST)
+        stale = self.link.read(_CHUNK, NOW)
         if stale or self._parser.pending:
             self._throw_away(stale)
-        self._servo, self._count, self._noise = servo, count, 0
         self._head = bytes((0xFF, 0xFF, servo, count + 2))
         self.put(packet)
         self.asked_at = self._free_at
         passed = self.asked_at + (count + OVERHEAD) * self.byte_time
-        self._passed = passed
-        self._earliest = passed if self._is_paced else _PAST
+        self.expect(servo, count, passed, is_paced=self._is_paced)
         self.deadline = passed + self.patience + patience
 
     def poll(self, until: float) -> Outcome:
@@ -202,7 +162,7 @@ class Wire:
             and data[:4] == self._head
             and sum(data) & 0xFF == _SOUND
             and not self._parser.pending
-            and (self._earliest == _PAST or self.clock.now() >= self._earliest)
+            and (self._earliest == NOW or self.clock.now() >= self._earliest)
         ):
             return self._accept(data[4], data[5:-1])
         if data:
@@ -221,20 +181,6 @@ class Wire:
             pass
         return outcome
 
-    def free_count(self, servo: int, counts: range) -> int | None:
-        """The first of several lengths that no reply still on its way can have; None where there is none."""
-        expected = self._expected.get(servo)
-        if not expected:
-            return counts[0]
-        now = self.clock.now()
-        for count in [count for count, until in expected.items() if until <= now]:
-            del expected[count]
-        return next((count for count in counts if count not in expected), None)
-
-    def quiet_at(self, servo: int) -> float:
-        """When no reply of a servo can be on its way any more, s."""
-        return max(self._expected.get(servo, {}).values(), default=0.0)
-
     def reopen(self) -> None:
         """Open the line again after it was lost.
 
@@ -247,99 +193,6 @@ class Wire:
         self.statistics.reopened += 1
         self.tune()
 
-    def _accept(self, error: int, data: bytes) -> Outcome:
-        self.error, self.data = error, data
-        self._last = (self._servo, data)
-        self._slack = max(self.clock.now() - self._passed, _SLACK_DECAY * self._slack)
-        self.statistics.of(self._servo).note(failed=False)
-        return Outcome.OK
-
-    def _lose(self) -> Outcome:
-        until = self.clock.now() + self.config.late_window
-        self._expected.setdefault(self._servo, {})[self._count] = until
-        if self._noise:
-            return self._spoil(f"{self._noise} unreadable bytes")
-        counts = self.statistics.of(self._servo)
-        counts.note(failed=True)
-        counts.lost += 1
-        return Outcome.LOST
-
-    def _spoil(self, detail: str) -> Outcome:
-        counts = self.statistics.of(self._servo)
-        counts.note(failed=True)
-        counts.corrupt += 1
-        self.detail = detail
-        return Outcome.CORRUPT
-
-    def _judge(self, found: list[StatusPacket | Problem]) -> Outcome:
-        """What the packets and problems that have come mean for the request."""
-        answers: list[StatusPacket] = []
-        spoilt = ""
-        for item in found:
-            if isinstance(item, Problem):
-                self._count_problem(item)
-                if item.kind is ProblemKind.BAD_CHECKSUM and item.id == self._servo:
-                    spoilt = "bad checksum"
-            elif self._is_answer(item):
-                answers.append(item)
-            else:
-                spoilt = self._explain(item) or spoilt
-        if answers:
-            return self._choose(answers)
-        if spoilt and not self._parser.pending:
-            return self._spoil(spoilt)
-        return Outcome.WAITING
-
-    def _is_answer(self, packet: StatusPacket) -> bool:
-        if packet.id != self._servo or self.clock.now() < self._earliest:
-            return False
-        return len(packet.parameters) == self._count or self._is_refusal(packet)
-
-    def _is_refusal(self, packet: StatusPacket) -> bool:
-        return bool(packet.error & _PAYLOAD_ERRORS) and not packet.parameters
-
-    def _choose(self, answers: list[StatusPacket]) -> Outcome:
-        counts = self.statistics.of(self._servo)
-        counts.duplicates += len(answers) - 1
-        answer = answers[0]
-        if any(other.parameters != answer.parameters for other in answers):
-            return self._spoil("two different replies to one request")
-        self.error = answer.error
-        if answer.error & ErrorBit.CHECKSUM:
-            return self._spoil("the request reached the servo with a bad checksum")
-        if self._is_refusal(answer):
-            counts.note(failed=False)
-            counts.refused += 1
-            return Outcome.REFUSED
-        return self._accept(answer.error, answer.parameters)
-
-    def _explain(self, packet: StatusPacket) -> str:
-        """Count a packet that does not answer the request; words where it spoils it."""
-        count = len(packet.parameters)
-        counts = self.statistics.of(packet.id)
-        expected = self._expected.get(packet.id)
-        if expected and expected.pop(count, None) is not None:
-            counts.late += 1
-            return ""
-        if packet.id == self._last[0] and count == len(self._last[1]):
-            counts.duplicates += 1
-            if packet.parameters != self._last[1]:
-                self.doubted.append(packet.id)
-            return ""
-        if packet.id != self._servo:
-            if self._servo >= 0:
-                self.statistics.of(self._servo).wrong_id += 1
-            return ""
-        counts.short += 1
-        return f"{count} bytes instead of {self._count}"
-
-    def _count_problem(self, problem: Problem) -> None:
-        if problem.kind is ProblemKind.GARBAGE:
-            self.statistics.garbage_bytes += len(problem.data)
-            self._noise += len(problem.data)
-        elif problem.kind is ProblemKind.BAD_CHECKSUM:
-            self.statistics.bad_checksums += 1
-
     def _throw_away(self, stale: bytes) -> None:
         """What waits before a request cannot be its answer: count it, and forget it."""
         self._servo = -1
@@ -347,15 +200,8 @@ class Wire:
         while stale and chunks < _MOST_STALE:
             self.statistics.stale_bytes += len(stale)
             self._tally(self._parser.feed(stale))
-            stale = self.link.read(_CHUNK, _PAST)
+            stale = self.link.read(_CHUNK, NOW)
             chunks += 1
         self._tally(self._parser.flush())
         if stale:
             self.link.discard()
-
-    def _tally(self, found: list[StatusPacket | Problem]) -> None:
-        for item in found:
-            if isinstance(item, Problem):
-                self._count_problem(item)
-            else:
-                self._explain(item)
