@@ -9,12 +9,10 @@ from pathlib import Path
 import pytest
 
 from bluefoot_mpc.exceptions import ConfigurationError, SimulationError
-from bluefoot_mpc.io.emulation.faults import Fault, FaultPlan
-from bluefoot_mpc.io.emulation.faults_line import FaultyLine
 from bluefoot_mpc.io.emulation.own_shafts import OwnShafts
 from bluefoot_mpc.io.emulation.pty_line import PtyLine
 from bluefoot_mpc.io.emulation.servo_line import ServoLine
-from tests.io.emulation.bench import PING, READ, packet, status
+from tests.io.emulation.bench import PING, packet, status
 
 sdk = pytest.importorskip("dynamixel_sdk", reason="ROBOTIS' client is not installed")
 
@@ -217,19 +215,34 @@ def test_a_device_that_breaks_hangs_up_and_says_why():
     pty.close()
 
 
+class Adapter(Echo):
+    """A device behind an adapter that a test pulls and plugs in again."""
+
+    gone = False
+
+    def hung_up(self, time):
+        return self.gone
+
+    def due(self):
+        return time.monotonic() + 0.01 if self.gone else super().due()
+
+
 def test_an_adapter_that_is_lost_hangs_up_and_comes_back_under_its_link(tmp_path):
-    line = ServoLine(OwnShafts(1), (1,))
-    plan = FaultPlan(faults=(Fault(kind="usb_lost", start=0.1, value=0.2),))
-    link = tmp_path / "servos"
-    with PtyLine(FaultyLine(line, plan, start=time.monotonic()), link=link):
+    device, link = Adapter(), tmp_path / "servos"
+    with PtyLine(device, link=link) as pty:
         client = opened(link)
+        os.write(client, b"one")
+        assert fetch(client, 3) == b"one"
+        device.gone = True
         with pytest.raises(OSError, match="Input/output"):
             keep_asking(client)
         os.close(client)
+        assert pty.is_serving
+        device.gone = False
         deadline = time.monotonic() + 5.0
         while not Path(link).exists() and time.monotonic() < deadline:
             time.sleep(0.01)
         client = opened(link)
-        os.write(client, packet(1, READ, 3, 1))
-        assert fetch(client, 7) == status(1, 0, 1)
+        os.write(client, b"two")
+        assert fetch(client, 3) == b"two"
         os.close(client)
