@@ -140,7 +140,7 @@ class _Run:
                 cut.goals = self._goals()
                 if self._on.parts is not None and self._on.truth is not None:
                     # On the bus's own clock, the check that torque is off included.
-                    is_off = not self._on.parts.report()["torque_on"]
+                    is_off = not _torque_on(self._on.parts.report())
                     cut.took_ms = 1e3 * (self._on.truth().time - cut.time) if is_off else None
             if cut.took_ms is None and frame.time > cut.time and truth is not None and not truth.duty.any():
                 cut.took_ms = 1e3 * (frame.time - cut.time)
@@ -157,7 +157,7 @@ class _Run:
     def _torque_left(self, data: RunData) -> float | None:
         """Servos that have torque at the end."""
         if self._devices:
-            return float(len(self._devices["torque_on"]))
+            return float(_torque_on(self._devices))
         if not isinstance(self._resolved.scenario, (ControlledStop, EmergencyStop)) or not data.commands:
             return None  # a simulation simply ends
         return float(np.count_nonzero(data.commands[-1].joints.torque_limit))
@@ -171,6 +171,11 @@ class _Run:
             "eeprom_writes": float(devices["eeprom_writes"]),
             "goal_writes_while_off": float(devices["goal_writes_while_off"]),
         }
+
+
+def _torque_on(report: dict[str, Any]) -> int:
+    """Servos with torque, by the report of emulated devices; none without the servos' supply."""
+    return len(report["torque_on"]) if report["power_on"] else 0
 
 
 def _motion(data: RunData, model: RobotModel, ended: float) -> Figures:
