@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rich import box
@@ -70,7 +70,7 @@ def scan(command: ScanCommand) -> Outcome:
             findings = silent or findings
     data = {
         "servos": [_facts_data(facts) for facts in found.servos.values()],
-        "missing": found.missing, "garbled": found.garbled, "bauds": bauds,
+        "missing": found.missing, "garbled": _by_text(found.garbled), "bauds": _by_text(bauds),
         "findings": findings_data(findings), "success": not findings,
     }  # fmt: skip
     page: list[Any] = [_scan_table(found)] if found.servos else []
@@ -199,6 +199,11 @@ def _facts_data(facts: ServoFacts) -> dict[str, Any]:
         "id": facts.id, "joint": facts.joint, "port": facts.port, "error": facts.error,
         "errors": facts.errors, **facts.registers,
     }  # fmt: skip
+
+
+def _by_text(table: Mapping[int, Any]) -> dict[str, Any]:
+    """A table for JSON, whose keys are texts."""
+    return {str(key): value for key, value in table.items()}
 
 
 def _list(ids: Sequence[int]) -> str:

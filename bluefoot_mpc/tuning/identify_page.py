@@ -71,20 +71,26 @@ def load_steps(file: Path) -> list[StepRecord]:
     """
     try:
         table = json.loads(file.read_text(encoding="utf-8"))
-        return [
-            StepRecord(**{
-                **row,
-                "time": np.array(row["time"], dtype=np.float64),
-                "position": np.array(row["position"], dtype=np.float64),
-            })
-            for row in table
-        ]  # fmt: skip
+        if not isinstance(table, list) or not table:
+            raise ValueError("there are none")
+        return [_record(row) for row in table]
     except OSError as error:
         raise ConfigurationError(f"cannot read {file}: {error.strerror or error}") from error
     except (ValueError, TypeError, KeyError) as error:
         raise ConfigurationError(
             f"{file} holds no recorded steps ({error}): give the steps.json of an earlier identification"
         ) from error
+
+
+def _record(row: Any) -> StepRecord:
+    arrays = {name: np.array(row[name], dtype=np.float64) for name in ("time", "position")}
+    if (
+        arrays["time"].ndim != 1
+        or arrays["time"].shape != arrays["position"].shape
+        or not arrays["time"].size
+    ):
+        raise ValueError("times and positions do not belong together")
+    return StepRecord(**{**row, **arrays})
 
 
 def _draw(axis: Any, record: StepRecord, curve: Any, bench: Bench) -> None:

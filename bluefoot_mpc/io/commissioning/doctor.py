@@ -67,7 +67,7 @@ def check_bus(
 
 
 def timing(buses: Sequence[ServoBus], cycle: BusCycle, clock: Clock, config: DoctorConfig) -> list[Finding]:
-    """Cycles a second that reading all servos takes, and replies that do not come; buses are fresh."""
+    """How often all servos can be read in a second, and replies that do not come; buses are fresh."""
     start = clock.now()
     cycles = 0
     while (now := clock.now()) - start < config.seconds:
@@ -111,7 +111,7 @@ def check_lidar(link: Link, clock: Clock) -> list[Finding]:
 
 
 def _judge_rate(rate: float) -> Finding:
-    text = f"{rate:.0f} cycles a second of all servos"
+    text = f"{rate:.0f} readings of all servos a second"
     if rate < LEAST_RATE:
         text += f", less than {LEAST_RATE:.0f}"
         return Finding(part="timing", text=text, mend=_FASTER, severity=Severity.REFUSAL)
