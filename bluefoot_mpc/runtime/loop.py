@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from bluefoot_mpc.control.pipeline import ControlOutput
-from bluefoot_mpc.io.safety import SafetySupervisor
+from bluefoot_mpc.io.safety import SafetyState, SafetySupervisor
 from bluefoot_mpc.runtime.data import COMPLETED, CommandRecord, RunData
 from bluefoot_mpc.runtime.garbage import YoungCollection
 from bluefoot_mpc.runtime.recorder import Recorder
@@ -164,7 +164,12 @@ def _ticks(
             stopping_since = min(stopping_since, now)
             if limp and now - stopping_since >= AFTER_FALL:
                 return _safe_reason(data)
-        if cut_short is not None and (limp or now - resting_since > REST_TIMEOUT):
+        if robot.state is SafetyState.EMERGENCY:
+            return robot.request.reasons[-1] if robot.request.reasons else "emergency stop"
+        if cut_short is None and hooks.rests and robot.stopped:
+            return _safe_reason(data)
+        at_rest = robot.stopped if hooks.rests else limp
+        if cut_short is not None and (at_rest or now - resting_since > REST_TIMEOUT):
             return cut_short
 
 

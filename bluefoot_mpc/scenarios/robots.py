@@ -88,4 +88,8 @@ def device_criteria(seen: Mapping[str, Any] | None) -> list[Criterion]:
             name="every torque off at the end", holds=not on,
             detail=f"on: servos {', '.join(map(str, on))}" if on else "off",
         ),
+        Criterion(
+            name="servos' supply off at the end", holds=not seen["power_on"],
+            detail="on" if seen["power_on"] else "off",
+        ),
     ]  # fmt: skip

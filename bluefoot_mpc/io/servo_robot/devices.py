@@ -37,6 +37,14 @@ _NO_BOARD = Finding(
     mend="Name its port: --set devices.board_port=/dev/ttyACM0",
     severity=Severity.REFUSAL,
 )
+_STILL_ON = Finding(
+    part="power board",
+    text="the servos' supply is still on after the board was told to cut it",
+    mend="Unplug the servos' battery",
+    severity=Severity.REFUSAL,
+)
+_CUT_TIME = 0.3
+"""s in which the board must say that the supply is off."""
 _TRIES = 5
 """Periods more in which all servos may answer while the robot is being armed."""
 _BOOT = 0.3
@@ -155,7 +163,11 @@ class DeviceCycle:
         self.may_move = False
         self.latch(reason)
         found = arming.torque_off(self._devices.buses, self._devices.layout)
-        self.cut_power()
+        board = self._devices.board
+        if board is not None:
+            board.cut()
+            if not board.wait_power(False, _CUT_TIME):
+                found.append(_STILL_ON)
         return tuple(finding for finding in found if finding.severity is Severity.REFUSAL)
 
     def latch(self, reason: str) -> None:
@@ -169,8 +181,10 @@ class DeviceCycle:
             self._devices.board.cut()
 
     def close(self) -> None:
-        """Give back every port."""
+        """Hear whether the servos' supply is off, and give back every port."""
         devices = self._devices
+        if devices.board is not None and self._joints is not None:
+            devices.board.wait_power(False, _CUT_TIME)
         for bus in devices.buses:
             bus.link.close()
         for device in (devices.board, devices.lidar, devices.camera):
