@@ -84,9 +84,8 @@ class Station:
             return
         if self._robot_ran:
             self._robot_ran = False
-            self.link.tell(
-                f"the robot's program has ended; Arm starts it again ({self.robot.last_words()})", fault=True
-            )
+            why = self.robot.last_words()
+            self.link.tell(f"the robot's program has ended; Arm starts it again. {why}".strip(), fault=True)
         elif self.link.result() in (("arm", ""), ("arm", "no answer")):
             self.link.tell("starting the robot's program")
             self.robot.start()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import signal
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from typing import IO
 
 from bluefoot_mpc.cli.station_arguments import StationCommand
 
+_VERDICT = re.compile(r"(OK|[A-Z]{4,}[^:]*|bluefoot): ")
 _PATIENCE = 15.0
 """s that the robot gets to sit down and write its log."""
 
@@ -60,11 +62,11 @@ class RobotProcess:
         )
 
     def last_words(self) -> str:
-        """The last lines that the robot's program wrote."""
+        """The line in which the robot's program said how it ended."""
         with contextlib.suppress(OSError):
             text = (self._folder / f"robot-{self._number}.txt").read_text("utf-8", "replace")
-            lines = [line.strip() for line in text.splitlines() if line.strip()]
-            return " / ".join(lines[-2:])
+            verdicts = [line.strip() for line in text.splitlines() if _VERDICT.match(line)]
+            return verdicts[-1] if verdicts else ""
         return ""
 
     def end(self) -> None:

@@ -37,7 +37,7 @@ def station_page(robot: RobotModel) -> str:
     }
     return render(
         "station.html.j2",
-        title=f"{robot.parameters.name} ground station",
+        title="BlueFoot ground station",
         station_css=embed_script(template_text("station.css")),
         facts=embed_json(facts),
         run_data=embed_json(scene_data(build_scene(robot), robot.parameters.legs.foot_radius)),

@@ -9,6 +9,9 @@ from bluefoot_mpc.io.safety import CommandWatchdog
 from bluefoot_mpc.io.station.link import StationLink
 from bluefoot_mpc.types import MotionCommand
 
+_GAP = 1.0
+"""s; a shorter silence is a gap that radios have, a longer one a fault."""
+
 
 class CommandSource(Protocol):
     """Wanted motion over time; the control loop asks once a tick."""
@@ -36,9 +39,10 @@ class LinkSource:
 
     def __call__(self, time: float) -> MotionCommand:
         """The station's command now."""
-        command = self._watchdog.step(*self._link.command(self._clock.now()))
+        wanted, age = self._link.command(self._clock.now())
+        command = self._watchdog.step(wanted, age)
         if self._watchdog.notice != self._notice:
             self._notice = self._watchdog.notice
             if self._notice:
-                self._link.say(self._notice, fault=True)
+                self._link.say(self._notice, fault=age > _GAP)
         return command

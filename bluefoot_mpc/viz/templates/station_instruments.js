@@ -24,7 +24,7 @@ function drawHorizon(canvas, roll, pitch, yaw) {
   g.fillStyle = "#a5794e"; g.fillRect(-2 * r, drop, 4 * r, 4 * r);
   g.strokeStyle = "#fff"; g.lineWidth = 2; g.beginPath(); g.moveTo(-2 * r, drop); g.lineTo(2 * r, drop); g.stroke();
   g.lineWidth = 1.25; g.fillStyle = "#fff"; g.font = "9.5px system-ui, sans-serif"; g.textAlign = "right"; g.textBaseline = "middle";
-  for (let mark = -20; mark <= 20; mark += 5) {
+  for (let mark = -15; mark <= 15; mark += 5) {
     if (!mark) continue;
     const y = drop - mark * perDegree, half = mark % 10 ? 11 : 22;
     g.beginPath(); g.moveTo(-half, y); g.lineTo(half, y); g.stroke();
