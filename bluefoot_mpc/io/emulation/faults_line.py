@@ -78,7 +78,7 @@ class FaultyLine:
             return
         for fault in self._request:
             if self._strikes(fault, data, time):
-                data = b"" if fault.kind == "drop_request" else changed(data, self._rng, first=2)
+                data = b"" if fault.kind == "drop_request" else self._corrupted(data)
         if data:
             self.device.receive(data, time)
 
@@ -170,6 +170,11 @@ class FaultyLine:
             return False
         self._count(fault.kind)
         return True
+
+    def _corrupted(self, data: bytes) -> bytes:
+        """One byte of what the host sent changed; of its first packet, where it sent packets."""
+        size = data[3] + 4 if is_packet(data) else len(data)
+        return changed(data[:size], self._rng, first=2 if size > 2 else 0) + data[size:]
 
     def _is_on(self, kind: str, time: float) -> bool:
         return any(f.kind == kind and f.is_on(time - self._start) for f in self._line)

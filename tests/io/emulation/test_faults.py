@@ -135,6 +135,13 @@ def test_a_corrupted_sync_write_reaches_nobody_or_is_refused():
     assert case.faulty.counts == {"corrupt_sync_write": 1}
 
 
+def test_only_the_sync_write_is_corrupted_where_more_follows():
+    for seed in range(20):
+        case = Case(Fault(kind="corrupt_sync_write"), seed=seed)
+        case.link.write(packet(ALL, SYNC_WRITE, 25, 1, 1, 1) + packet(2, PING))
+        assert case.line.requests[SYNC_WRITE] == 0
+
+
 def test_corrupt_requests_are_answered_with_an_error_or_not_at_all():
     case = Case(Fault(kind="corrupt_request"))
     assert case.ask(1, *POSITION) != GOOD
