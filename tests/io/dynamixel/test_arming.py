@@ -6,6 +6,8 @@ from bluefoot_mpc.io.dynamixel.bus import ServoBus
 from bluefoot_mpc.io.dynamixel.codec import ErrorBit, Instruction
 from bluefoot_mpc.io.dynamixel.latch import Latch
 from bluefoot_mpc.io.dynamixel.layout import ServoLayout, spread
+from bluefoot_mpc.io.emulation.faults import Fault, FaultPlan
+from bluefoot_mpc.io.emulation.faults_line import FaultyLine
 from bluefoot_mpc.io.emulation.memory_link import MemoryLink
 from bluefoot_mpc.io.emulation.own_shafts import OwnShafts
 from bluefoot_mpc.io.emulation.servo_line import ServoLine
@@ -114,6 +116,15 @@ def test_a_slow_adapter_is_refused_by_what_it_says_and_by_what_is_measured():
     refused = [f for f in check_servos([bus], LAYOUT) if f.severity is Severity.REFUSAL]
     assert len(refused) == 1
     assert "answers take 16.0 ms" in refused[0].text
+
+
+def test_an_emulated_latency_timer_of_16_ms_is_the_only_refusal():
+    clock, line = VirtualClock(), Emulated().line
+    plan = FaultPlan(faults=(Fault(kind="latency_timer"),))
+    bus = ServoBus(MemoryLink(FaultyLine(line, plan), clock), clock)
+    (finding,) = [f for f in check_servos([bus], LAYOUT) if f.severity is Severity.REFUSAL]
+    assert "a latency timer of 16 ms" in finding.text
+    assert "latency_timer" in finding.mend
 
 
 def test_arming_holds_where_the_joints_are():

@@ -168,6 +168,20 @@ def test_late_replies_never_pass_for_new_ones(delay):
         assert (readings.counts[readings.fresh] == value).all()
 
 
+def test_haste_gives_way_to_an_adapter_that_becomes_slower():
+    rig = Rig()
+    for _ in range(20):
+        rig.step()
+    rig.line.change = lambda servo, reply: [(0.0022, reply)]
+    for _ in range(20):
+        readings = rig.step(budget=0.06)
+    lost = rig.bus.statistics.total.lost
+    for _ in range(20):
+        readings = rig.step(budget=0.06)
+    assert readings.fresh.all()
+    assert rig.bus.statistics.total.lost == lost
+
+
 def test_duplicates_do_not_confuse():
     rig = Rig()
     rig.line.change = lambda servo, reply: [(0.0, reply), (0.0001, reply)]
