@@ -25,6 +25,8 @@ _REFUSALS = {
     Refusal.HEARTBEAT: "no heartbeat from this computer: the control program must run",
     Refusal.VOLTAGE: "the battery is too low: charge it",
 }
+_FINAL = (Refusal.MAGIC, Refusal.VOLTAGE)
+_NO_ANSWER = "the board does not answer the request for power: check its cable and supply"
 _CUTS = {
     CutReason.HEARTBEAT: "the board cut the servos' power: it heard no heartbeat for 0.5 s",
     CutReason.VOLTAGE: "the board cut the servos' power: the battery is too low",
@@ -55,7 +57,7 @@ class PowerControl:
         self._config = config
         self.phase = Phase.OFF
         self.is_cut = False
-        self.refused = ""
+        self.refused = self._why = ""
         self.report: Power | None = None
         self.heard = -math.inf
         self._cut_at = -math.inf
@@ -67,7 +69,7 @@ class PowerControl:
         if self.phase is Phase.ON and not self.is_cut:
             return []
         self.is_cut = False
-        self.refused = ""
+        self.refused = self._why = ""
         self.phase = Phase.ASKED
         self._tries = 0
         return self._ask(now)
@@ -95,7 +97,7 @@ class PowerControl:
         if self.phase in (Phase.ASKED, Phase.SENT) and now >= self._due:
             if self._tries >= self._config.answer_tries:
                 self.phase = Phase.OFF
-                self.refused = "the board does not answer the request for power: check its cable and supply"
+                self.refused = self._why or _NO_ANSWER
                 return []
             return self._ask(now)
         return []
@@ -108,10 +110,12 @@ class PowerControl:
         return [(Kind.POWER_ON, WORD.pack(~code & 0xFFFFFFFF))]
 
     def on_refusal(self, refusal: Refusal) -> None:
-        """The board does not switch on."""
+        """The board does not switch on; what may be otherwise in a moment is tried again."""
         if self.phase in (Phase.ASKED, Phase.SENT):
-            self.phase = Phase.OFF
-            self.refused = f"no power for the servos: {_REFUSALS[refusal]}"
+            self._why = f"no power for the servos: {_REFUSALS[refusal]}"
+            if refusal in _FINAL:
+                self.phase = Phase.OFF
+                self.refused = self._why
 
     def on_report(self, report: Power, now: float) -> None:
         """The board has told its state."""

@@ -101,9 +101,12 @@ def test_power_needs_heartbeats():
     bench = Bench()
     bench.run(0.1, beat=False)
     bench.driver.power(True)
-    frame = bench.run(0.3, beat=False)[-1]
+    frame = bench.run(0.8, beat=False)[-1]
     assert not frame.power_on
     assert any("no heartbeat" in text for text in frame.faults)
+    assert bench.robot.changes == []
+    bench.driver.power(True)
+    assert bench.run(0.3)[-1].power_on
 
 
 def test_a_low_battery_keeps_power_off_and_cuts_it():
