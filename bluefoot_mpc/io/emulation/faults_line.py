@@ -94,6 +94,7 @@ class FaultyLine:
         self._act(time)
         while (due := self.device.due()) <= time and (reply := self.device.transmit(due)):
             self._pass_on(reply, due)
+        self._pass_on(self.device.transmit(time), time)
         data = b""
         while self._waiting and self._waiting[0][0] <= time:
             data += heapq.heappop(self._waiting)[2]

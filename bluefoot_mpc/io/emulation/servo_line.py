@@ -107,6 +107,8 @@ class ServoLine:
 
     def transmit(self, time: float) -> bytes:
         """Every reply that has arrived at the host by `time` (s) and was not handed out before."""
+        # Time passes for the shafts also while the host only listens, or is silent for an hour.
+        self.shafts.advance(time)
         bursts = self._bursts
         data = b""
         while bursts and bursts[0].end <= time:

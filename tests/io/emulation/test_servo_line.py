@@ -127,6 +127,11 @@ def test_eeprom_writes_are_counted(bench):
     assert bench.line.eeprom_writes == 17
 
 
+def test_time_passes_for_the_shafts_while_the_host_is_silent(bench):
+    bench.link.read(1, 7.0)
+    assert bench.shafts.time == 7.0
+
+
 @pytest.mark.parametrize(
     ("ids", "baud", "text"),
     [((), 1_000_000, "at least one"), ((254,), 1_000_000, "0..253"), ((1, 1), 1_000_000, "twice"),
