@@ -45,7 +45,7 @@ class Camera:
     """Newest picture of a camera or a video file; nobody waits for it.
 
     Args:
-        source: number of the camera, or path of a video file.
+        source: number of the camera (also as text), its path under /dev, or path of a video file.
         clock: clock of the time stamps; real time.
         config: how pictures are taken.
 
@@ -57,7 +57,9 @@ class Camera:
     def __init__(
         self, source: int | str, clock: Clock | None = None, config: CameraConfig | None = None
     ) -> None:
-        self._source, self._clock = source, clock or MonotonicClock()
+        is_number = isinstance(source, str) and source.isdecimal()
+        self._source = int(source) if is_number else source
+        self._clock = clock or MonotonicClock()
         self._config = config or CameraConfig()
         self._newest: CameraImage | None = None
         self._is_new = False
@@ -82,6 +84,12 @@ class Camera:
         age = self._clock.now() - image.time - self._config.delay
         return f"no picture for {age:.1f} s" if age > self._config.silence else ""
 
+    def open(self) -> None:
+        """Begin to take pictures; returns at once. What goes wrong stands in `fault`. Idempotent."""
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, name="bluefoot camera", daemon=True)
+            self._thread.start()
+
     def start(self, timeout: float = 3.0) -> None:
         """Open the camera and wait for the first picture.
 
@@ -91,9 +99,7 @@ class Camera:
         Raises:
             CameraError: none came; the camera goes on being tried until `close`.
         """
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._run, name="bluefoot camera", daemon=True)
-            self._thread.start()
+        self.open()
         with self._arrived:
             if not self._arrived.wait_for(lambda: self.pictures > 0, timeout):
                 mend = "Check its cable, or give another number or file"
@@ -127,6 +133,8 @@ class Camera:
 
     def _run(self) -> None:
         cv2 = importlib.import_module("cv2")
+        # What goes wrong stands in `fault`; OpenCV would print it again at every attempt.
+        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
         while not self._ended.is_set():
             capture = cv2.VideoCapture(self._source)
             try:
@@ -144,7 +152,7 @@ class Camera:
         if not capture.isOpened():
             self._trouble = "cannot be opened"
             return
-        is_file = isinstance(self._source, str)
+        is_file = isinstance(self._source, str) and not self._source.startswith("/dev/")
         if not is_file:
             capture.set(cv2.CAP_PROP_FRAME_WIDTH, config.width)
             capture.set(cv2.CAP_PROP_FRAME_HEIGHT, config.height)

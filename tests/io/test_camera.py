@@ -85,7 +85,7 @@ def test_a_looped_file_never_ends(video):
     camera.close()
 
 
-def test_a_missing_camera_is_named_and_does_not_stop_anybody(tmp_path, capfd):
+def test_a_missing_camera_is_named_and_does_not_stop_anybody(tmp_path):
     camera = Camera(str(tmp_path / "none.avi"), config=QUICK)
     with pytest.raises(CameraError, match=r"none\.avi: cannot be opened\. Check its cable"):
         camera.start(timeout=0.2)
@@ -112,6 +112,14 @@ def test_opencv_is_loaded_only_when_a_camera_is_opened(monkeypatch):
     assert camera.take() is None
     assert camera.fault == "not started"
     camera.close()
+
+
+def test_a_number_may_be_text_and_opencv_keeps_quiet(capfd):
+    camera = Camera("97", config=QUICK)
+    with pytest.raises(CameraError, match="camera 97: cannot be opened"):
+        camera.start(timeout=0.3)
+    camera.close()
+    assert "VIDEOIO" not in capfd.readouterr().err
 
 
 def test_impossible_values_are_refused():
