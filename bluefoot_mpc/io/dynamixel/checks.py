@@ -28,7 +28,8 @@ class CheckConfig:
 
     cw_limit: int = 0  # counts, least that the angle limits may allow
     ccw_limit: int = 1023  # counts
-    least_voltage: float = 10.8  # V, 3S pack: below it a robot is not armed
+    low_voltage: float = 10.8  # V, 3S pack: below it the finding is a warning
+    least_voltage: float = 10.2  # V, below it a robot is not armed: it would sit down at once
     most_voltage: float = 12.8  # V
     most_temperature: int = 60  # °C at which arming is refused
     slow_adapter_ms: float = 1.0  # latency timer beyond which the adapter is worth a warning
@@ -39,6 +40,7 @@ class CheckConfig:
 
     def __post_init__(self) -> None:
         require_positive(
+            low_voltage=self.low_voltage,
             least_voltage=self.least_voltage,
             most_voltage=self.most_voltage,
             slow_adapter_ms=self.slow_adapter_ms,
@@ -191,10 +193,12 @@ def _state(part: str, block: bytes, error: int, config: CheckConfig) -> list[Fin
     """What may be wrong today: voltage, heat, errors."""
     findings = []
     volts = voltage_from_register(_value(block, "present_voltage"))
+    charge = "Charge or replace the pack"
     if volts < config.least_voltage:
-        findings.append(
-            _refusal(part, f"{volts:.1f} V is below {config.least_voltage:g} V", "Charge or replace the pack")
-        )
+        findings.append(_refusal(part, f"{volts:.1f} V is below {config.least_voltage:g} V", charge))
+    elif volts < config.low_voltage:
+        text = f"{volts:.1f} V is below {config.low_voltage:g} V: it will not last long"
+        findings.append(Finding(part=part, text=text, mend=charge, severity=Severity.WARNING))
     elif volts > config.most_voltage:
         findings.append(
             _refusal(

@@ -89,10 +89,13 @@ def test_state_of_today():
     robot.line.servos[1].forced_temperature = 64.0
     robot.line.servos[2].forced_voltage = 10.1
     robot.line.servos[3].forced_overload = True
+    robot.line.servos[4].forced_voltage = 10.5
     hot, empty, loaded = robot.refusals()
     assert "64 °C" in hot.text
     assert "10.1 V is below" in empty.text
     assert "its load is more" in loaded.text
+    (low,) = [finding for finding in robot.check() if finding.severity is Severity.WARNING]
+    assert "10.5 V is below 10.8 V" in low.text
 
 
 def test_a_missing_servo_and_an_id_given_twice():
