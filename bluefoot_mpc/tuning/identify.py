@@ -8,6 +8,7 @@ stall torque; on a bench with a known weight the weight's moment enters the fit.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import importlib
 import io
 from collections.abc import Callable, Mapping, Sequence
@@ -32,6 +33,8 @@ _TAIL = 0.02
 """s of readings that count after the last change of a reading: a shaft that rests tells nothing more."""
 _LATENCY_SCALE = 0.02
 _FD_STEP = 0.01
+_TOLERANCE = 1e-5
+"""Relative change of variables or of the cost at which a fit ends: far below what readings can tell."""
 _POOR_FIT = 1.5
 """Counts of rms residual above which the law does not describe the servo."""
 
@@ -194,6 +197,12 @@ def _moving(record: StepRecord) -> BoolArray:
     return np.asarray(record.time <= last + _TAIL)
 
 
+def _trimmed(record: StepRecord) -> StepRecord:
+    """A record without its tail at rest."""
+    kept = _moving(record)
+    return dataclasses.replace(record, time=record.time[kept], position=record.position[kept])
+
+
 def _scales(servo: ServoParameters) -> tuple[FloatArray, FloatArray]:
     """(5,) scale and (5,) offset of the fit's variables: value = scale * x - offset, x near 1.
 
@@ -211,14 +220,13 @@ def _fitted(records: Sequence[StepRecord], bench: Bench, iterations: int, start:
     sysid = _sysid()
     scale, offset = _scales(bench.servo)
     low, high = ((vector(end) + offset) / scale for end in limits_of(bench.servo))
-    simulated = StepBench(records, bench)
-    masks = [_moving(record) for record in records]
+    moving = [_trimmed(record) for record in records]
+    simulated = StepBench(moving, bench)
     begin = np.clip((vector(start) + offset) / scale, low + 1e-3 * (high - low), high - 1e-3 * (high - low))
 
     def residual(x: FloatArray, _: Any) -> tuple[list[FloatArray], None, None]:
         curves = simulated.at_readings(_of_vector(np.ravel(x) * scale - offset))
-        each = zip(curves, records, masks, strict=True)
-        return [(curve - record.position)[mask] for curve, record, mask in each], None, None
+        return [curve - r.position for curve, r in zip(curves, moving, strict=True)], None, None
 
     parameters = sysid.ParameterDict({
         name: sysid.Parameter(name, begin[k], low[k], high[k]) for k, name in enumerate(NAMES)
@@ -227,7 +235,7 @@ def _fitted(records: Sequence[StepRecord], bench: Bench, iterations: int, start:
     with contextlib.redirect_stdout(io.StringIO()):
         found, _ = sysid.optimize(
             parameters, residual, optimizer="scipy", verbose=False, max_iters=iterations,
-            diff_step=_FD_STEP, x_scale="jac",
+            diff_step=_FD_STEP, x_scale="jac", xtol=_TOLERANCE, ftol=_TOLERANCE,
         )  # fmt: skip
     return _of_vector(found.as_vector() * scale - offset)
 

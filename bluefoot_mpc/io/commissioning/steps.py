@@ -20,7 +20,7 @@ class StepPlan:
 
     amplitudes_deg: tuple[float, ...] = (2.0, 4.0, 8.0, 16.0, 32.0)  # degrees
     repeats: int = 1  # times the whole pattern
-    duration: float = 0.6  # s of recording after each step
+    duration: float = 0.45  # s of recording after each step
     torque_limit: float = 1.0  # share of full duty
     middle: int = 512  # counts, where the pattern starts and ends
     slope: int = 32  # register 28 and 29 while recording
