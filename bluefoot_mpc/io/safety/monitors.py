@@ -168,18 +168,18 @@ class ReplyMonitor:
         self._lost.append(lost)
         faults = self._alone(answered, dt) if self._required else []
         if self._sum > self._config.max_silent_share * N_JOINTS * self._length:
-            names = ", ".join(JOINTS[i] for i, known in enumerate(answered) if not known)
-            text = f"too many lost joint readings (now: {names or 'none'}). Check the bus and its adapter"
+            now = _names([i for i, known in enumerate(answered) if not known])
+            text = f"too many lost joint readings (now: {now}). Check the bus and its adapter"
             faults.append(Fault(key="replies", response=Response.SIT, text=text, latched=False))
         return faults
 
     def _alone(self, answered: list[bool], dt: float) -> list[Fault]:
         self._silent = [0.0 if known else age + dt for known, age in zip(answered, self._silent, strict=True)]
-        names = [JOINTS[i] for i, age in enumerate(self._silent) if age > self._config.silence_window]
-        if not names:
+        gone = [i for i, age in enumerate(self._silent) if age > self._config.silence_window]
+        if not gone:
             return []
-        text = f"no reply from {', '.join(names)} for {self._config.silence_window:g} s. Check the plugs"
-        return [Fault(key=f"silent {names[0]}", response=Response.SIT, text=text)]
+        text = f"no reply from {_names(gone)} for {self._config.silence_window:g} s. Check the plugs"
+        return [Fault(key=f"no reply {gone[0]}", response=Response.SIT, text=text)]
 
 
 class InertialMonitor:
@@ -257,6 +257,12 @@ class FrameMonitor:
             return []
         text = "the time of the robot's frames does not go on: nothing measured can be trusted"
         return [Fault(key="frames", response=Response.STOP, text=text)]
+
+
+def _names(joints: list[int]) -> str:
+    if len(joints) == N_JOINTS:
+        return "all servos"
+    return ", ".join(JOINTS[i] for i in joints) or "none"
 
 
 def _unknown(key: str, text: str, long: bool) -> Fault:

@@ -30,8 +30,8 @@ class HealthMonitor:
     def step(self, health: Health, dt: float) -> list[Fault]:
         """Judge an account that came `dt` (s) after the last one."""
         faults = [
-            *self._lost(health.shut_down, "has switched itself off (overload or overheating)", "Let it cool"),
-            *self._lost(health.restarted, "lost its power and came back without torque", "Check its plug"),
+            *self._lost(health.shut_down, "switched off by itself (overload or overheating)", "Let it cool"),
+            *self._lost(health.restarted, "back after a loss of power, without torque", "Check the plug"),
         ]
         self._had_power = self._had_power or health.power_on is True
         self._without_power = self._without_power + dt if health.power_on is False else 0.0
@@ -40,9 +40,9 @@ class HealthMonitor:
             faults.append(Fault(key="power", response=Response.EMERGENCY, text=text))
         if health.guard in _GUARDED:
             faults.append(Fault(key=f"guard {health.guard}", response=_GUARDED[health.guard], text=_AWAY))
-        for joint in health.silent:
-            text = f"servo {JOINTS[joint]} does not answer as it should. Check its plug"
-            faults.append(Fault(key=f"silent servo {joint}", response=Response.WARN, text=text))
+        for key, who in _named(health.silent):
+            text = f"{who} not answering as expected. Check plugs and adapter"
+            faults.append(Fault(key=f"silent {key}", response=Response.WARN, text=text))
         if health.watched is False:
             text = "the watchdog beside the robot's program is gone. Sit the robot down and start anew"
             faults.append(Fault(key="watchdog", response=Response.SIT, text=text))
@@ -55,14 +55,24 @@ class HealthMonitor:
         return faults
 
     def _lost(self, joints: tuple[int, ...], what: str, mend: str) -> list[Fault]:
-        faults = []
-        for joint in joints:
-            self.dead[joint] = True
-            text = f"servo {JOINTS[joint]} {what}: it stays off. {mend}, then arm anew"
-            faults.append(Fault(key=f"{what} {joint}", response=Response.STOP, text=text))
-        return faults
+        self.dead[list(joints)] = True
+        return [
+            Fault(
+                key=f"{what} {key}", response=Response.STOP, text=f"{who} {what}: no torque. {mend}, arm anew"
+            )
+            for key, who in _named(joints)
+        ]
 
 
+def _named(joints: tuple[int, ...]) -> list[tuple[str, str]]:
+    """Keys and subjects of messages: one for each servo, or one for all where there are many."""
+    if len(joints) > _MANY:
+        return [("many", f"{len(joints)} of {N_JOINTS} servos are")]
+    return [(str(joint), f"servo {JOINTS[joint]} is") for joint in joints]
+
+
+_MANY = 4
+"""Servos that are named one by one."""
 _POWER_ON_TIME = 0.5
 """s after arming within which the board must say that the servos' supply is on."""
 _GUARDED = {GuardState.SINK: Response.STOP, GuardState.OFF: Response.EMERGENCY}

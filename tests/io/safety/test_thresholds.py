@@ -317,6 +317,21 @@ def test_a_servo_without_torque_is_never_silently_enabled_again(supervisor, fake
         np.testing.assert_array_equal(command.torque_limit > 0.0, np.arange(16) != 6)
 
 
+def test_many_servos_are_told_of_at_once(supervisor, fake):
+    fake.account = Health(silent=tuple(range(16)))
+    fake.changes = {"joint_valid": np.zeros(16, dtype=bool)}
+    play(supervisor, 1.0)
+    assert len(supervisor.warnings) == 1
+    assert "no reply from all servos" in told(supervisor)
+    fake.changes = {}
+    fake.account = Health(restarted=tuple(range(16)))
+    play(supervisor, 1.0)
+    assert "16 of 16 servos are back" in told(supervisor)
+    assert len(supervisor.request.reasons) == 2
+    assert supervisor.state is SafetyState.STOPPED  # there is no torque left to end the gait with
+    assert fake.log[-1] == "disarm"
+
+
 def test_a_guard_that_had_to_step_in_is_believed(supervisor, fake):
     fake.account = Health(guard=GuardState.HOLD)
     play(supervisor, 0.1)
