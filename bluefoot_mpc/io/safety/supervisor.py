@@ -68,6 +68,7 @@ class SafetySupervisor:
         self._monitors.reset()
         self._sink: Sink | None = None
         self._unusable = 0.0
+        self._limp = False
 
     @property
     def state(self) -> SafetyState:
@@ -78,6 +79,11 @@ class SafetySupervisor:
     def stopped(self) -> bool:
         """True where no torque may be on."""
         return self.state in states.LIMP
+
+    @property
+    def limp(self) -> bool:
+        """True where a run may end: no torque was sent last, and what must be switched off is."""
+        return self.stopped if self._powered is not None else self._limp
 
     @property
     def request(self) -> SafetyRequest:
@@ -126,7 +132,8 @@ class SafetySupervisor:
         sent = self._lowered() if self._takes_over() else self.check(command)
         frame = self.robot.step(sent)
         self._watch(frame)
-        self._advance(limp=not sent.torque_limit.any())
+        self._limp = not sent.torque_limit.any()
+        self._advance(limp=self._limp)
         return frame
 
     def check(self, command: JointCommand) -> JointCommand:

@@ -168,6 +168,20 @@ def test_a_controller_that_asks_for_no_torque_ends_the_session(supervisor, fake)
     assert not fake.sent[-1].torque_limit.any()  # standing up again takes arming again
 
 
+def test_a_run_may_end_when_the_robot_is_limp_not_when_the_controller_says_so(supervisor, fake):
+    assert not supervisor.limp
+    play(supervisor, 0.6, goal(np.nan))
+    play(supervisor, 0.1, goal(0.3, torque=0.0))
+    assert not supervisor.limp  # the supervisor is lowering it
+    play(supervisor, 4.0, goal(0.3, torque=0.0))
+    assert supervisor.limp
+    simulated = supervise(FakeRobot())
+    simulated.reset()
+    for torque in (1.0, 0.0, 1.0):
+        simulated.step(goal(0.0, torque=torque))
+        assert simulated.limp == (torque == 0.0)
+
+
 def test_a_simulated_robot_may_be_limp_and_stand_up_again():
     fake = FakeRobot()
     supervisor = supervise(fake)
