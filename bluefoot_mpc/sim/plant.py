@@ -63,6 +63,11 @@ class SimPlant(SimBody):
         return self._frame
 
     @property
+    def nominal_supply(self) -> float:
+        """V of the pack without load, as this run drew it."""
+        return self._bank.config.open_voltage
+
+    @property
     def trunk(self) -> int:
         """MuJoCo's number of the trunk."""
         return self._world.trunk

@@ -22,6 +22,7 @@ from bluefoot_mpc.scenarios import folder as folder_module
 from bluefoot_mpc.scenarios.config import resolve
 from bluefoot_mpc.scenarios.registry import SHIPPED
 from bluefoot_mpc.scenarios.runner import simulate
+from bluefoot_mpc.sim.robot import SimRobot
 from bluefoot_mpc.types import MotionCommand, TrunkPose
 
 pytestmark = pytest.mark.slow
@@ -119,7 +120,7 @@ def test_an_error_in_a_run_tells_where_the_log_lies(tmp_path, monkeypatch):
     def fall_apart(*_):
         raise RuntimeError("gone")
 
-    monkeypatch.setattr(runner.SimRobot, "truth", fall_apart)
+    monkeypatch.setattr(SimRobot, "truth", fall_apart)
     with pytest.raises(RuntimeError, match="gone") as caught:
         run("stand", RunOptions(duration=1.0, report=False, out=tmp_path))
     assert caught.value.__notes__ == [f"the log, as far as it goes, is in {tmp_path / 'log.mcap'}"]

@@ -162,8 +162,11 @@ class DeviceCycle:
         """Torque off three times, verified, then the servos' supply. Goals are refused from now on."""
         self.may_move = False
         self.latch(reason)
-        found = arming.torque_off(self._devices.buses, self._devices.layout)
         board = self._devices.board
+        if self._board is not None and not self._board.power_on:
+            # Servos without a supply are limp, and answer nobody.
+            return tuple(arming.broadcast_off(self._devices.buses))
+        found = arming.torque_off(self._devices.buses, self._devices.layout)
         if board is not None:
             board.cut()
             if not board.wait_power(False, _CUT_TIME):

@@ -68,7 +68,7 @@ class ServoRobot:
     def step(self, command: JointCommand) -> SensorFrame:
         """Send a command, let one command period pass, return the next frame."""
         action = self._guard.step(self._clock.now(), 0.0, command)
-        if action.state is GuardState.OFF:
+        if action.state is GuardState.OFF and self._cycle.may_move:
             _tell(self._cycle.off(action.reason))
         elif action.command is not None:
             self._cycle.send(action.command)
