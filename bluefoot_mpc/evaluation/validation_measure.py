@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import logging
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,17 +20,21 @@ from bluefoot_mpc.io.safety import SafetySupervisor
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime import metrics
 from bluefoot_mpc.runtime.data import COMPLETED, RunData
-from bluefoot_mpc.runtime.loop import INTERRUPTED, LoopHooks, run_loop
+from bluefoot_mpc.runtime.loop import INTERRUPTED, LoopHooks, Observer, run_loop
 from bluefoot_mpc.runtime.summary import fell, summarize
 from bluefoot_mpc.runtime.window import SETTLING
 from bluefoot_mpc.scenarios import RunOptions
 from bluefoot_mpc.scenarios.config import Resolved, resolve
 from bluefoot_mpc.scenarios.robots import RunRobot, make_robot
 from bluefoot_mpc.scenarios.runner import sitting, supervise
-from bluefoot_mpc.types import Mode, SensorFrame, TruthSample
+from bluefoot_mpc.types import N_JOINTS, JointCommand, Mode, SensorFrame, TruthSample
 
 _MOVING = (Instruction.SYNC_WRITE, Instruction.REG_WRITE, Instruction.ACTION)
 """Instructions with which the driver moves servos."""
+_GOES_ON = 0.5
+"""s before the end of its run at which the emergency stop is pulled."""
+_ASKED = 10
+"""Control periods in which torque is still asked for after it."""
 
 
 def measure_validation(case: Case, seed: int) -> Figures:
@@ -73,11 +76,19 @@ def _quiet() -> Iterator[None]:
 
 @dataclass(slots=True)
 class _Cut:
-    """The emergency stop of a run: when (s), how long it took (ms), goals sent until then."""
+    """The emergency stop of a run.
 
-    time: float = math.inf
+    Attributes:
+        was_pulled: True once it was.
+        took_ms: until every torque was off; None where one stayed on.
+        goals: instructions that move servos, sent afterwards.
+        torque_left: servos with torque a little later, though a controller went on asking for it.
+    """
+
+    was_pulled: bool = False
     took_ms: float | None = None
     goals: int = 0
+    torque_left: int | None = None
 
 
 class _Run:
@@ -88,9 +99,7 @@ class _Run:
         self._model = RobotModel(resolved.parameters)
         self._pipeline = Pipeline(self._model, resolved.stages.control, resolved.command_period)
         self._on: RunRobot = make_robot(resolved, self._model, sitting(self._pipeline, self._model))
-        self._supervisor: SafetySupervisor | None = None
         self._cut = _Cut()
-        self._goals_at_end = 0
         self._devices: dict[str, Any] = {}
 
     def drive(self) -> RunData:
@@ -98,15 +107,12 @@ class _Run:
         scenario, on = self._resolved.scenario, self._on
         is_emergency = isinstance(scenario, EmergencyStop)
         # A simulated robot is brought to rest as well: that is what a controlled stop is.
-        rests = on.rests or isinstance(scenario, ControlledStop)
-        source = scenario.command if is_emergency else scenario.source
+        rests = (on.rests and not is_emergency) or isinstance(scenario, ControlledStop)
         try:
-            self._supervisor = supervise(on.robot, self._model, self._resolved)
-            hooks = LoopHooks(
-                truth=on.truth, rests=rests, observers=(self._cutting(),) if is_emergency else ()
-            )
-            data = run_loop(self._supervisor, self._pipeline, source, hooks, self._resolved.table())
-            self._goals_at_end = self._goals()
+            supervisor = supervise(on.robot, self._model, self._resolved)
+            observers = (self._cutting(supervisor),) if is_emergency else ()
+            hooks = LoopHooks(truth=on.truth, rests=rests, observers=observers)
+            data = run_loop(supervisor, self._pipeline, scenario.source, hooks, self._resolved.table())
             self._devices = on.devices() if on.devices is not None else {}
         finally:
             on.robot.close()
@@ -117,8 +123,7 @@ class _Run:
         scenario = self._resolved.scenario
         figures: Figures = {"torque_left": self._torque_left(data), **self._seen_by_devices()}
         if isinstance(scenario, EmergencyStop):
-            after = self._goals_at_end - self._cut.goals
-            return {**figures, "emergency_ms": self._cut.took_ms, "goals_after": float(after)}
+            return {**figures, "emergency_ms": self._cut.took_ms, "goals_after": float(self._cut.goals)}
         end = scenario.config.duration
         ended = data.frames[0].time + end if data.frames else 0.0
         figures |= _motion(data, self._model, ended)
@@ -126,26 +131,36 @@ class _Run:
             figures |= _rest(data, ended)
         return figures
 
-    def _cutting(self) -> Callable[[SensorFrame, ControlOutput, TruthSample | None], None]:
-        """An observer that pulls the emergency stop when the time has come, and sees when torque is gone."""
+    def _cutting(self, supervisor: SafetySupervisor) -> Observer:
+        """An observer that pulls the emergency stop when the time has come, and sees what it did."""
         began: list[float] = []
+        at = self._resolved.scenario.config.duration - _GOES_ON
 
         def observe(frame: SensorFrame, output: ControlOutput, truth: TruthSample | None) -> None:
             began.append(frame.time)
-            cut, since = self._cut, frame.time - began[0]
-            if cut.time == math.inf and since >= self._resolved.scenario.config.duration:
-                cut.time = frame.time
-                if self._supervisor is not None:
-                    self._supervisor.emergency("validation")
-                cut.goals = self._goals()
-                if self._on.parts is not None and self._on.truth is not None:
-                    # On the bus's own clock, the check that torque is off included.
-                    is_off = not _torque_on(self._on.parts.report())
-                    cut.took_ms = 1e3 * (self._on.truth().time - cut.time) if is_off else None
-            if cut.took_ms is None and frame.time > cut.time and truth is not None and not truth.duty.any():
-                cut.took_ms = 1e3 * (frame.time - cut.time)
+            if not self._cut.was_pulled and frame.time - began[0] >= at:
+                self._pull(supervisor, frame, output.command)
 
         return observe
+
+    def _pull(self, supervisor: SafetySupervisor, frame: SensorFrame, command: JointCommand) -> None:
+        """Pull the emergency stop, and go on asking for torque as a controller that was not told would."""
+        cut, on = self._cut, self._on
+        cut.was_pulled = True
+        supervisor.emergency("validation")
+        before = self._goals()
+        if on.parts is not None and on.truth is not None and not _torque_on(on.parts.report()):
+            # On the bus's own clock, the check that torque is off included.
+            cut.took_ms = 1e3 * (on.truth().time - frame.time)
+        asked = replace(command, torque_limit=np.ones(N_JOINTS))
+        for _ in range(_ASKED):
+            now = supervisor.step(asked).time
+            if on.truth is not None:
+                left = np.count_nonzero(on.truth().duty)
+                cut.torque_left = int(left)
+                if not left and cut.took_ms is None:
+                    cut.took_ms = 1e3 * (now - frame.time)
+        cut.goals = self._goals() - before
 
     def _goals(self) -> int:
         """Instructions that move servos, sent until now."""
@@ -156,9 +171,11 @@ class _Run:
 
     def _torque_left(self, data: RunData) -> float | None:
         """Servos that have torque at the end."""
+        if isinstance(self._resolved.scenario, EmergencyStop):
+            return _float(self._cut.torque_left)
         if self._devices:
             return float(_torque_on(self._devices))
-        if not isinstance(self._resolved.scenario, (ControlledStop, EmergencyStop)) or not data.commands:
+        if not isinstance(self._resolved.scenario, ControlledStop) or not data.commands:
             return None  # a simulation simply ends
         return float(np.count_nonzero(data.commands[-1].joints.torque_limit))
 
@@ -171,6 +188,10 @@ class _Run:
             "eeprom_writes": float(devices["eeprom_writes"]),
             "goal_writes_while_off": float(devices["goal_writes_while_off"]),
         }
+
+
+def _float(value: int | None) -> float | None:
+    return None if value is None else float(value)
 
 
 def _torque_on(report: dict[str, Any]) -> int:

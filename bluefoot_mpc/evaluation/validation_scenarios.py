@@ -14,7 +14,7 @@ class ControlledStop(Walk):
 
 
 class EmergencyStop(Walk):
-    """Walk, then lose all torque at once; the duration is when."""
+    """Walk, then lose all torque at once, a moment before the end."""
 
     name = "emergency stop"
 
