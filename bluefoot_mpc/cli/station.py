@@ -61,13 +61,14 @@ class Station:
             loop.add_signal_handler(number, self._interrupt)
         due = loop.time()
         while not (self.operator.ended or self.interrupted):
-            self._turn()
+            self.turn()
             due = max(due + PERIOD, loop.time())
             await asyncio.sleep(due - loop.time())
         self.link.ask(Order.HALT)
         await asyncio.sleep(0.1)
 
-    def _turn(self) -> None:
+    def turn(self) -> None:
+        """Look at everything once: keys, sticks, the robot, the pages."""
         self.operator.update()
         self._watch_robot()
         if self.server is not None and self.server.pages:

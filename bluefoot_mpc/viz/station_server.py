@@ -13,12 +13,13 @@ import ipaddress
 import json
 import secrets
 import socket
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 from urllib.parse import urlsplit
 
 import orjson
-from tornado import httpserver, netutil, web, websocket
+from tornado import httpserver, web, websocket
 
 from bluefoot_mpc.exceptions import ConfigurationError
 
@@ -214,9 +215,9 @@ class StationServer:
             rules, websocket_max_message_size=_LONGEST, websocket_ping_interval=2, log_function=_quiet
         )
         self._server = httpserver.HTTPServer(application)
-        sockets = _listen(host, PORTS if port is None else (port,))
-        self._server.add_sockets(sockets)
-        chosen = sockets[0].getsockname()[1]
+        listening = _listen(host, PORTS if port is None else (port,))
+        self._server.add_socket(listening)
+        chosen = listening.getsockname()[1]
         everywhere = host in ("0.0.0.0", "::", "")
         shown = socket.gethostname() if everywhere else f"[{host}]" if ":" in host else host
         self.url = f"http://{shown}:{chosen}/" + (f"?token={token}" if token else "")
@@ -239,13 +240,17 @@ class StationServer:
             page.close()
 
 
-def _listen(host: str, ports: Any) -> list[Any]:
+def _listen(host: str, ports: Sequence[int]) -> socket.socket:
     problem: OSError | None = None
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for port in ports:
         try:
-            return list(netutil.bind_sockets(port, address=host))
+            listening = socket.create_server((host, port), family=family)
         except OSError as error:
             problem = error
+        else:
+            listening.setblocking(False)
+            return listening
     where = f"{host}, port {ports[0]}" + (f" to {ports[-1]}" if len(ports) > 1 else "")
     raise ConfigurationError(
         f"cannot serve the page on {where}: {problem}. Choose another --host or --page-port"

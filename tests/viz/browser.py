@@ -49,23 +49,27 @@ class Browser:
         )  # fmt: skip
         self._window = window
         self._number = 0
+        self._connections: list[websocket.WebSocketClientConnection] = []
         self.complaints: list[str] = []
 
     async def open(self, url: str) -> None:
         """Go to an address in the browser's first page."""
-        browser = await websocket.websocket_connect(self._debugger(), max_message_size=1 << 28)
-        self._socket = browser
+        self._socket = await self._connect(self._debugger())
         targets = (await self.call("Target.getTargets"))["targetInfos"]
         page = next(target["targetId"] for target in targets if target["type"] == "page")
-        browser.close()
         address = self._debugger().rsplit("/devtools/", 1)[0] + f"/devtools/page/{page}"
-        self._socket = await websocket.websocket_connect(address, max_message_size=1 << 28)
+        self._socket = await self._connect(address)
         await self.call("Runtime.enable")
         await self.call("Page.enable")
         width, height = self._window
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         await self.call("Emulation.setDeviceMetricsOverride", **metrics)
         await self.call("Page.navigate", url=url)
+
+    async def _connect(self, address: str) -> websocket.WebSocketClientConnection:
+        connection = await websocket.websocket_connect(address, max_message_size=1 << 28)
+        self._connections.append(connection)
+        return connection
 
     async def call(self, method: str, **parameters: Any) -> dict[str, Any]:
         """One command of the DevTools protocol, and its result."""
@@ -131,6 +135,15 @@ class Browser:
         """Keep what is seen as a PNG."""
         data = (await self.call("Page.captureScreenshot", format="png"))["data"]
         path.write_bytes(base64.b64decode(data))
+
+    async def leave(self) -> None:
+        """Hang up, and end the browser."""
+        for connection in self._connections:
+            connection.close()
+        await asyncio.sleep(0.1)
+        self.close()
+        # The browser has closed its ends; now ours learn of it.
+        await asyncio.sleep(0.1)
 
     def close(self) -> None:
         """End the browser."""
