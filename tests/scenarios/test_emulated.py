@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.io.emulation.ax12a import SYNC_WRITE
+from bluefoot_mpc.io.dynamixel.codec import Instruction
 from bluefoot_mpc.io.findings import NotArmedError
 from bluefoot_mpc.io.robot import PoweredRobot
 from bluefoot_mpc.runtime.log import read_log
@@ -103,11 +103,11 @@ def test_it_is_limp_until_armed_and_after_a_stop():
     robot.step(command)
     robot.stop()
     assert not any(servo.registers[24] for servo in line.all)
-    written = line.requests[SYNC_WRITE]
+    written = line.requests[Instruction.SYNC_WRITE]
     assert written > 0
     for _ in range(10):
         robot.step(dataclasses.replace(command, position=command.position + 0.3))
-    assert line.requests[SYNC_WRITE] == written
+    assert line.requests[Instruction.SYNC_WRITE] == written
     assert not line.is_powered
     robot.stop()
     robot.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections import deque
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from bluefoot_mpc.io.dynamixel.cycle import BusCycle, Readings
 from bluefoot_mpc.io.dynamixel.layout import ServoLayout
 from bluefoot_mpc.io.findings import Finding, Severity
 from bluefoot_mpc.io.lidar.driver import Lidar
+from bluefoot_mpc.io.lidar.errors import LidarError
 from bluefoot_mpc.io.safety.health import Health
 from bluefoot_mpc.io.servo_robot.config import DevicesConfig
 from bluefoot_mpc.io.servo_robot.frames import sensor_frame
@@ -106,7 +108,11 @@ class DeviceCycle:
         self.may_move = False
         devices, clock = self._devices, self._clock
         if devices.lidar is not None:
-            devices.lidar.start()
+            # The robot walks without it; the check before arming tells.
+            with contextlib.suppress(LidarError):
+                devices.lidar.start()
+        if devices.camera is not None:
+            devices.camera.open()
         if devices.board is not None:
             devices.board.power(True)
             devices.board.wait_power(True, self._config.connect_time)
