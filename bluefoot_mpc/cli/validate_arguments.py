@@ -27,8 +27,10 @@ class ValidateCommand(Common):
     """
 
     config_file: Annotated[
-        Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[CONFIG.toml]", help_behavior_hint="")
-    ] = None
+        tuple[Path, ...],
+        tyro.conf.Positional,
+        tyro.conf.arg(metavar="[CONFIG.toml]", help_behavior_hint=""),
+    ] = ()
     """TOML file with any part of the configuration, as in a run's config.toml; without one, the
     configuration that ships is validated."""
     config: Annotated[Path | None, _Unset] = None
@@ -56,10 +58,9 @@ class ValidateCommand(Common):
     """Folder of the records ($BLUEFOOT_RECORDS, or ~/.local/share/bluefoot/validation, unless given)."""
 
     def __post_init__(self) -> None:
-        if self.config_file is not None and self.config is not None:
-            raise ConfigurationError(
-                f"two configurations: {self.config_file} and --config {self.config}; give one"
-            )
+        given = [*self.config_file, *([] if self.config is None else [self.config])]
+        if len(given) > 1:
+            raise ConfigurationError(f"two configurations: {given[0]} and {given[1]}; give one")
         if self.workers is not None and self.workers < 1:
             raise ConfigurationError(f"--workers = {self.workers} must be at least 1")
         self.plan()
@@ -74,6 +75,5 @@ class ValidateCommand(Common):
 
     def run_fields(self) -> dict[str, Any]:
         """What chooses the configuration, by the names that RunOptions gives it."""
-        return {
-            "config": self.config_file or self.config, "model": self.model, "controller": self.controller,
-        }  # fmt: skip
+        config = next(iter(self.config_file), self.config)
+        return {"config": config, "model": self.model, "controller": self.controller}
