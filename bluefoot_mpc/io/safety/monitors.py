@@ -176,7 +176,8 @@ class ReplyMonitor:
     def _alone(self, answered: list[bool], dt: float) -> list[Fault]:
         self._silent = [0.0 if known else age + dt for known, age in zip(answered, self._silent, strict=True)]
         gone = [i for i, age in enumerate(self._silent) if age > self._config.silence_window]
-        if not gone:
+        # As many at once are no plug: that is the line's, told and forgiven as lost readings.
+        if not gone or len(gone) > self._config.max_silent_share * N_JOINTS:
             return []
         text = f"no reply from {_names(gone)} for {self._config.silence_window:g} s. Check the plugs"
         return [Fault(key=f"no reply {gone[0]}", response=Response.SIT, text=text)]
