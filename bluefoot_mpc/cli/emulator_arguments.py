@@ -11,15 +11,15 @@ import tyro
 from bluefoot_mpc.cli.arguments import Common
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 
-PHYSICS = ("own",)
+PHYSICS = ("own", "robot")
 """What can turn the shafts of emulated servos."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EmulatorCommand(Common):
-    """Emulate a bus of AX-12A servos on a port that other programs can open, until Ctrl-C.
+    """Emulate AX-12A servos, or the whole robot, on ports that other programs can open, until Ctrl-C.
 
-    The port is a pseudo-terminal: every program for these servos may open it, at the servos' baud
+    A port is a pseudo-terminal: every program for these servos may open it, at the servos' baud
     rate. With --json the line with the port comes first, and the servos run on until Ctrl-C.
     """
 
@@ -31,13 +31,19 @@ class EmulatorCommand(Common):
     """TOML file with faults (docs/emulator.md)."""
     link: Annotated[Path | None, tyro.conf.arg(metavar="PATH", help_behavior_hint="")] = None
     """Make a symbolic link to the port, so that its name is always the same."""
-    physics: Annotated[str, tyro.conf.arg(metavar="{own}")] = "own"
-    """What the servos turn: joints of their own."""
+    physics: Annotated[str, tyro.conf.arg(metavar="{own,robot}")] = "own"
+    """What the servos turn: joints of their own, or the simulated robot's (with its sensor board)."""
+    calibration: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """Robot: write the calibration that fits the emulated servos into this file."""
 
     def __post_init__(self) -> None:
         parse_ids(self.ids)
         if self.physics not in PHYSICS:
             raise UnknownNameError("physics", self.physics, PHYSICS)
+        if self.physics == "robot" and (self.link is not None or self.ids != "1-16"):
+            raise ConfigurationError("--link and --ids are for --physics own: the robot has servos 1-16")
+        if self.physics == "own" and self.calibration is not None:
+            raise ConfigurationError("--calibration is for --physics robot")
 
 
 def parse_ids(text: str) -> tuple[int, ...]:

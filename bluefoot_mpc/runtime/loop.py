@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from bluefoot_mpc.control.pipeline import ControlOutput
-from bluefoot_mpc.io.safety import SafetyState, SafetySupervisor
+from bluefoot_mpc.io.safety import ArmingInterruptedError, SafetyState, SafetySupervisor
 from bluefoot_mpc.runtime.data import COMPLETED, CommandRecord, RunData
 from bluefoot_mpc.runtime.garbage import YoungCollection
 from bluefoot_mpc.runtime.recorder import Recorder
@@ -101,12 +101,16 @@ def run_loop(
     """
     data = RunData(period=robot.period, config=config)
     started = time.perf_counter()
-    with _interruptible() as interrupted, YoungCollection() as garbage:
+    with _interruptible(robot.interrupt) as interrupted, YoungCollection() as garbage:
         try:
-            frame = robot.reset()
             controller.reset()
+            frame = robot.reset()
             hooks = replace(hooks, observers=(*hooks.observers, lambda *_: garbage.tick()))
             data.stop_reason = _ticks(robot, controller, source, hooks, data, frame, interrupted)
+        except ArmingInterruptedError:
+            if not interrupted.is_set():
+                raise
+            data.stop_reason = INTERRUPTED
         finally:
             robot.stop()
     elapsed = time.perf_counter() - started
@@ -125,20 +129,11 @@ def _ticks(
     interrupted: threading.Event,
 ) -> str:
     start = frame.time
-    cut_short: str | None = None
-    resting_since = stopping_since = float("inf")
-    misses = 0
+    ending = _Ending()
+    misses = warned = 0
     while True:
         now = frame.time - start
-        motion: MotionCommand | None = _REST
-        if cut_short is None and interrupted.is_set():
-            cut_short = INTERRUPTED
-        elif cut_short is None:
-            motion, cut_short = _ask(source, now)
-            if motion is None and hooks.rests:
-                motion, cut_short = _REST, COMPLETED
-        if cut_short is not None:
-            resting_since = min(resting_since, now)
+        motion = _wanted(source, now, ending, interrupted, hooks.rests)
         if motion is None:
             return COMPLETED
         safety = robot.request
@@ -147,30 +142,72 @@ def _ticks(
             output = controller.step(frame, motion, safety)
         except Exception as error:  # The boundary that keeps a robot standing when its controller breaks.
             log.exception("the controller failed at %.2f s", frame.time)
-            _ramp_down(robot, data, frame)
+            _ramp_down(robot, data, frame, hooks.rests)
             return f"controller error: {type(error).__name__}: {error}"
         tick_us = (time.perf_counter_ns() - tick_start) * 1e-3
         telemetry = _timed(output.telemetry, tick_us, robot.period, misses)
-        misses = telemetry.deadline_misses
+        if len(robot.warnings) > warned:
+            telemetry = replace(telemetry, events=(*telemetry.events, *robot.warnings[warned:]))
+        misses, warned = telemetry.deadline_misses, len(robot.warnings)
         output = ControlOutput(command=output.command, telemetry=telemetry)
         try:
             _record(data, hooks, frame, motion, safety, output)
         except Exception:  # A full disk or a broken viewer is no reason to drop the robot.
-            _ramp_down(robot, data, frame)
+            _ramp_down(robot, data, frame, hooks.rests)
             raise
         frame = robot.step(output.command)
-        mode, limp = telemetry.mode, not any(output.command.torque_limit.tolist())
-        if mode is Mode.SAFE:
-            stopping_since = min(stopping_since, now)
-            if limp and now - stopping_since >= AFTER_FALL:
-                return _safe_reason(data)
+        reason = ending.reason(robot, telemetry.mode, now, hooks.rests)
+        if reason is not None:
+            return reason or _safe_reason(data)
+
+
+@dataclass(kw_only=True, slots=True)
+class _Ending:
+    """How a run comes to its end.
+
+    Attributes:
+        cut_short: why the robot is being brought to rest; None while the run goes on.
+        resting_since: s, since when.
+        stopping_since: s, since when the controller is in its safe mode.
+    """
+
+    cut_short: str | None = None
+    resting_since: float = float("inf")
+    stopping_since: float = float("inf")
+
+    def begin(self, why: str, now: float) -> None:
+        """Bring the robot to rest."""
+        self.cut_short = why
+        self.resting_since = now
+
+    def reason(self, robot: SafetySupervisor, mode: Mode, now: float, rests: bool) -> str | None:
+        """Why the run is over now, empty where the controller's account tells it; None while it is not."""
         if robot.state is SafetyState.EMERGENCY:
             return robot.request.reasons[-1] if robot.request.reasons else "emergency stop"
-        if cut_short is None and hooks.rests and robot.stopped:
-            return _safe_reason(data)
-        at_rest = robot.stopped if hooks.rests else limp
-        if cut_short is not None and (at_rest or now - resting_since > REST_TIMEOUT):
-            return cut_short
+        if mode is Mode.SAFE:
+            self.stopping_since = min(self.stopping_since, now)
+            if robot.limp and now - self.stopping_since >= AFTER_FALL:
+                return ""
+        if self.cut_short is None:
+            return "" if rests and robot.stopped else None
+        return self.cut_short if robot.limp or now - self.resting_since > REST_TIMEOUT else None
+
+
+def _wanted(
+    source: CommandSource, now: float, ending: _Ending, interrupted: threading.Event, rests: bool
+) -> MotionCommand | None:
+    """The motion of this tick, rest once the run is being ended; None where it simply ends."""
+    if ending.cut_short is None and interrupted.is_set():
+        ending.begin(INTERRUPTED, now)
+    if ending.cut_short is not None:
+        return _REST
+    motion, failure = _ask(source, now)
+    if failure is not None:
+        ending.begin(failure, now)
+    elif motion is None and rests:
+        ending.begin(COMPLETED, now)
+        return _REST
+    return motion
 
 
 def _timed(telemetry: Telemetry, tick_us: float, period: float, misses: int) -> Telemetry:
@@ -214,8 +251,11 @@ def _record(
         observer(frame, output, truth)
 
 
-def _ramp_down(robot: SafetySupervisor, data: RunData, frame: SensorFrame) -> None:
-    """Hold the last goals, and let the body sink as torque is taken away."""
+def _ramp_down(robot: SafetySupervisor, data: RunData, frame: SensorFrame, rests: bool) -> None:
+    """Lower the body without its controller; where it need not sit down, torque is just taken away."""
+    if rests:
+        robot.controlled_stop("the controller has failed")
+        return
     last = data.commands[-1].joints.position if data.commands else frame.joint_position
     # Goals that are not finite would make the supervisor hold at full torque to the end.
     goal = np.where(np.isfinite(last), last, np.nan_to_num(frame.joint_position))
@@ -236,8 +276,11 @@ def _safe_reason(data: RunData) -> str:
 
 
 @contextmanager
-def _interruptible() -> Iterator[threading.Event]:
-    """Turn the first Ctrl-C (or termination, or hang-up) into an event; a second one interrupts for real."""
+def _interruptible(tell: Callable[[], None]) -> Iterator[threading.Event]:
+    """Turn the first Ctrl-C (or termination, or hang-up) into an event; a second one interrupts for real.
+
+    `tell` is called from the signal's handler at the first.
+    """
     event = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield event
@@ -247,6 +290,7 @@ def _interruptible() -> Iterator[threading.Event]:
         if event.is_set():
             raise KeyboardInterrupt
         event.set()
+        tell()
 
     # What is ignored stays so: nohup, and commands in the background of a script.
     heard = [number for number in _ENDINGS if signal.getsignal(number) is not signal.SIG_IGN]

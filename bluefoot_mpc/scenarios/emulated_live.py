@@ -66,6 +66,11 @@ class EmulatorProcess:
             raise DeviceError("the emulator's process tells no truth")
         return self._newest
 
+    @property
+    def is_running(self) -> bool:
+        """False once it has ended."""
+        return self._process.poll() is None
+
     def close(self) -> None:
         """End the process and take its report. Idempotent."""
         if self._process.stdin is not None and not self._process.stdin.closed:
@@ -95,6 +100,27 @@ class EmulatorProcess:
             return  # the last line of a process that was killed
 
 
+def start_emulator(resolved: Resolved, model: RobotModel, sitting: Posture, zero: float) -> EmulatorProcess:
+    """Start the process of an emulated robot.
+
+    Args:
+        resolved: configuration with simulation and devices.
+        model: the robot's model.
+        sitting: how it lies at the start.
+        zero: s on the machine's monotonic clock that count as zero.
+
+    Raises:
+        DeviceError: it did not start.
+    """
+    return EmulatorProcess(
+        Order(
+            model=to_table(model.parameters), sim=to_table(resolved.stages.sim),
+            devices=to_table(resolved.stages.devices), seed=resolved.run.seed,
+            joints=sitting.joints.tolist(), height=sitting.height, zero=zero,
+        )
+    )  # fmt: skip
+
+
 def make_emulated_live(resolved: Resolved, model: RobotModel, sitting: Posture) -> RunRobot:
     """An emulated robot in real time, reached as a real one is.
 
@@ -104,12 +130,7 @@ def make_emulated_live(resolved: Resolved, model: RobotModel, sitting: Posture) 
         sitting: how it lies at the start, and sinks to by itself.
     """
     zero = time.monotonic()
-    order = Order(
-        model=to_table(model.parameters), sim=to_table(resolved.stages.sim),
-        devices=to_table(resolved.stages.devices), seed=resolved.run.seed,
-        joints=sitting.joints.tolist(), height=sitting.height, zero=zero,
-    )  # fmt: skip
-    process = EmulatorProcess(order)
+    process = start_emulator(resolved, model, sitting, zero)
     config = replace(resolved.stages.devices, lidar_port=process.ports["lidar"] or "")
     try:
         robot = live_robot(

@@ -77,3 +77,29 @@ def test_it_serves_until_it_is_told_to_stop(stop, tmp_path):
         assert process.stdout.read() == ""
         assert process.stderr.read() == ""
     assert not link.is_symlink()
+
+
+@pytest.mark.slow
+def test_a_run_on_the_emulated_robots_ports_is_a_run_on_hardware(tmp_path):
+    """The ports of one process, the drivers of another: what is between them is what a robot would have."""
+    calibration = tmp_path / "calibration.toml"
+    words = [sys.executable, "-m", "bluefoot_mpc.cli", "emulator", "--physics", "robot", "--json"]
+    with subprocess.Popen(
+        [*words, "--calibration", str(calibration)], stdout=subprocess.PIPE, text=True
+    ) as emulator:
+        ports = json.loads(emulator.stdout.readline())
+        command = ["run", "stand", "--robot", "hardware", "--duration", "2", "--no-report", "--json"]
+        settings = [f"devices.board_port={ports['board']}", f"devices.calibration={calibration}"]
+        for setting in settings:
+            command += ["--set", setting]
+        run = subprocess.run(
+            [sys.executable, "-m", "bluefoot_mpc.cli", *command, "--port", ports["servos"][0]],
+            capture_output=True, text=True, timeout=120, check=False, cwd=tmp_path,
+        )  # fmt: skip
+        emulator.send_signal(signal.SIGINT)
+        emulator.wait(timeout=20)
+    assert run.returncode == 0, run.stderr
+    summary = json.loads(run.stdout)
+    assert summary["robot"] == "hardware"
+    assert summary["stop_reason"] == "completed"
+    assert summary["roll_rms_deg"] is None

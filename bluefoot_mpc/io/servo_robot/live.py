@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from bluefoot_mpc.exceptions import DeviceError
 from bluefoot_mpc.io.clock import Clock
-from bluefoot_mpc.io.findings import Finding
+from bluefoot_mpc.io.findings import Finding, Severity
 from bluefoot_mpc.io.safety.guard import Guard, GuardState
 from bluefoot_mpc.io.safety.health import Health
 from bluefoot_mpc.io.servo_robot.config import DevicesConfig
@@ -143,11 +143,11 @@ class LiveRobot:
 
     def stop(self) -> None:
         """Emergency: torque off and power cut at once; nothing moves again until armed. Never raises."""
-        if not self._is_armed:
-            return
         # Here and now, whatever the bus thread is doing; it sends the rest.
         self._cycle.latch("stopped")
         self._guard.emergency("stopped")
+        if not self._is_armed:
+            return
         self._cycle.cut_power()
         with self._changed:
             self._changed.notify_all()
@@ -224,8 +224,7 @@ class LiveRobot:
 
     def _work(self) -> None:
         """One period: jobs that wait, a set-point, a frame."""
-        if self._is_watched and not self._beat_watchdog():
-            self._guard.emergency("the watchdog process is gone, or has switched the torque off")
+        self._watch()
         while self._jobs:
             self._jobs.popleft()()
         with self._changed:
@@ -245,6 +244,7 @@ class LiveRobot:
 
     def _guarded(self, command: JointCommand | None, given_at: float) -> None:
         """Write what the guard allows."""
+        self._watch()
         now = self._clock.now()
         action = self._guard.step(now, now - given_at, command)
         if action.state is GuardState.OFF:
@@ -261,12 +261,22 @@ class LiveRobot:
         for finding in findings:
             log.warning("%s", finding)
 
-    def _beat_watchdog(self) -> bool:
-        return self._watchdog is None or self._watchdog.beat(self._cycle.lost_ports)
+    def _watch(self) -> None:
+        """Tell the watchdog process that all is well, and hear whether it thinks so."""
+        if self._watchdog is None or not self._is_watched:
+            return
+        if not self._watchdog.beat(self._cycle.lost_ports):
+            self._guard.emergency("the watchdog process has switched the torque off")
 
     def _check(self) -> tuple[Finding, ...]:
         findings = self._cycle.check()
         self._cycle.restart()
+        if self._watchdog is not None and self._watchdog.lost:
+            mend = "Start the program again"
+            gone = Finding(
+                part="watchdog process", text=self._watchdog.lost, mend=mend, severity=Severity.REFUSAL
+            )
+            return (*findings, gone)
         return findings
 
     def _arm(self, torque_limit: float) -> SensorFrame:
@@ -274,7 +284,7 @@ class LiveRobot:
         self._is_off.clear()
         # From the first beat on it expects the next: what came before could take its time.
         self._is_watched = True
-        self._beat_watchdog()
+        self._watch()
         self._cycle.arm(torque_limit)
         self._setpoint, self._given_at = None, self._clock.now()
         self._is_armed = True

@@ -84,8 +84,10 @@ class ServoRobot:
 
     def stop(self) -> None:
         """Emergency: torque off and power cut at once; nothing moves again until armed. Never raises."""
+        # An arming under way in another thread finds the latch closed, and takes its torque back.
+        self._cycle.latch("stopped")
+        self._guard.emergency("stopped")
         if self._cycle.may_move:
-            self._guard.emergency("stopped")
             _tell(self._cycle.cut("stopped"))
 
     def close(self) -> None:
