@@ -1,4 +1,4 @@
-"""``bluefoot drive``: a person at the keyboard, or a gamepad, commands the simulated robot in real time."""
+"""``bluefoot drive``: a person at the keyboard, or a gamepad, commands a robot in real time."""
 
 from __future__ import annotations
 

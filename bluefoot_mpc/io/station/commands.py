@@ -173,7 +173,7 @@ class CommandInbox:
         self.halt(Mode.OFF)
         self.wishes.arm, self.wishes.emergency = False, True
         if self.on_emergency is not None:
-            self.on_emergency("emergency stop by the ground station")
+            self.on_emergency("asked for by the ground station")
         return ACCEPTED
 
     def halt(self, mode: Mode) -> None:

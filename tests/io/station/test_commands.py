@@ -224,7 +224,7 @@ def test_an_emergency_is_passed_on_at_once(inbox, order):
     inbox.on_emergency = heard.append
     assert inbox.execute(order) == ACCEPTED
     assert inbox.wishes.emergency
-    assert heard == ["emergency stop by the ground station"]
+    assert heard == ["asked for by the ground station"]
 
 
 @pytest.mark.parametrize(

@@ -100,7 +100,7 @@ def test_an_emergency_is_passed_on_from_the_links_own_thread(station):
         station.hear("HEARTBEAT")
         station.tell(station.peer.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, 21196.0))
         wait_for(lambda: heard)
-        assert heard == [("emergency stop by the ground station", "station link")]
+        assert heard == [("asked for by the ground station", "station link")]
         assert link.emergency_requested
 
 
