@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -111,15 +111,20 @@ def _runs(jobs: Sequence[tuple[Case, int]], workers: int) -> Iterator[tuple[Case
     # Forked children would inherit threads of the linear algebra: start fresh ones.
     context = multiprocessing.get_context("spawn")
     others = set(multiprocessing.active_children())
-    with ProcessPoolExecutor(max_workers=min(workers, len(jobs)), mp_context=context) as pool:
+    with ProcessPoolExecutor(
+        max_workers=min(workers, len(jobs)), mp_context=context,
+        initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN),
+    ) as pool:  # fmt: skip
         waiting = {pool.submit(measure_validation, case, seed): (case, seed) for case, seed in jobs}
         try:
             for future in as_completed(waiting):
                 yield (*waiting[future], future.result())
         except BaseException:
-            # Ctrl-C: what runs is ended, what waits is not begun; what is done is kept.
+            # Ctrl-C. A run that is under way would bring its robot to rest first: it is only a simulated one.
+            ended = set(multiprocessing.active_children()) - others
+            for child in ended:
+                child.kill()
             pool.shutdown(wait=False, cancel_futures=True)
-            for child in set(multiprocessing.active_children()) - others:
-                with contextlib.suppress(OSError):
-                    child.terminate()
+            for child in ended:
+                child.join()
             raise

@@ -221,7 +221,6 @@ def _motion(data: RunData, model: RobotModel, ended: float) -> Figures:
         "speed_error_percent": 100.0 * abs(seen - speed) / speed if moving else None,
         "drift_percent": 100.0 * abs(summary["lateral_drift_m"] / distance) if moving and distance else None,
         "qp_failures": summary["qp_failures"],
-        "deadline_misses": summary["deadline_misses"],
     }
 
 

@@ -1,5 +1,7 @@
 """Running a validation: what is run, what is kept, what a stop leaves."""
 
+import multiprocessing
+
 import pytest
 
 from bluefoot_mpc.evaluation import validation as module
@@ -120,3 +122,16 @@ def test_only_a_full_plan_allows_a_deployment():
     assert Plan().is_full
     assert not Plan(seeds=2).is_full
     assert not Plan(quick=True, seeds=20).is_full
+
+
+@pytest.mark.slow
+def test_processes_side_by_side_are_gone_when_nobody_wants_them(tmp_path):
+    subject = subject_of(RunOptions(controller="cpg"))
+    wanted = Job(subject=subject, plan=Plan(quick=True), out=tmp_path, records=tmp_path, workers=2)
+    case = wanted.cases()[0]
+    before = set(multiprocessing.active_children())
+    runs = module._runs([(case, seed) for seed in range(6)], workers=2)
+    _, seed, figures = next(runs)
+    assert figures == module.measure_validation(case, seed)
+    runs.close()
+    assert set(multiprocessing.active_children()) == before
