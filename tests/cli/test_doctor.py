@@ -134,3 +134,15 @@ def test_lidar_is_checked():
 @pytest.mark.parametrize("words", [["--seconds", "0"], ["--seconds", "100"]])
 def test_wrong_times_are_wrong_use(capfd, words):
     assert run(capfd, *words)[0] == 2
+
+
+@pytest.mark.parametrize(("volts", "severity"), [(10.4, Severity.REFUSAL), (10.7, Severity.WARNING)])
+def test_a_low_pack_is_named(volts, severity):
+    bench = Bench()
+    bench.shafts.set_supply(volts)
+    config = examine.DoctorConfig(seconds=0.2)
+    findings = examine.check_bus(bench.ports(), tuple(range(1, 17)), None, "bluefoot", config)
+    low = [finding for finding in findings if finding.part.startswith("servo 7 ")]
+    assert [finding.severity for finding in low] == [severity]
+    assert f"{volts} V" in low[0].text
+    assert "pack" in low[0].mend

@@ -109,7 +109,7 @@ def test_a_dead_bus_is_told_from_a_wrong_rate():
             lambda bench: setattr(bench.line.servos[3], "forced_temperature", 66.0),
             ["servo 3 (FL_knee)", "66 °C"],
         ),
-        (lambda bench: bench.shafts.set_supply(10.2), ["below 10.8 V", "Charge"]),
+        (lambda bench: bench.shafts.set_supply(9.8), ["below 10.2 V", "Charge"]),
         (lambda bench: bench.line.servos[6].write(RETURN_DELAY, 250), ["servo 6", "bluefoot servo setup"]),
         (lambda bench: bench.line.plug(bench.line.servos[8], False, 0.0), ["servo 8 (FR_ankle)", "no reply"]),
         (lambda bench: bench.line.servos[9].write(BAUD, 34), ["servo 9", "no reply"]),
