@@ -13,12 +13,14 @@ from bluefoot_mpc.io.clock import Clock
 from bluefoot_mpc.io.commissioning.checks import check_ids, layout_of
 from bluefoot_mpc.io.commissioning.ports import ServoPorts
 from bluefoot_mpc.io.commissioning.survey import survey
+from bluefoot_mpc.io.dynamixel.arming import CheckConfig
 from bluefoot_mpc.io.dynamixel.bus import ServoBus
 from bluefoot_mpc.io.dynamixel.cycle import BusCycle
 from bluefoot_mpc.io.findings import Finding, Severity
 from bluefoot_mpc.io.lidar.driver import Lidar
 from bluefoot_mpc.io.lidar.errors import LidarError
 from bluefoot_mpc.io.link import Link, LinkError
+from bluefoot_mpc.io.servo_robot.config import DevicesConfig
 from bluefoot_mpc.settings import require_range
 from bluefoot_mpc.types import N_JOINTS
 
@@ -48,7 +50,8 @@ def check_bus(
     """Ports, servos, calibration against the servos that are there, and timing; reads only."""
     try:
         found = survey(ports, ids)
-        findings = check_ids(ports, ids, found=found)
+        armed = CheckConfig(least_voltage=DevicesConfig().arming_voltage)
+        findings = check_ids(ports, ids, armed, found)
         seen = {s: (f["model_number"], f["firmware_version"]) for s, f in found.servos.items()}
         if calibration is not None:
             findings += calibration_findings(calibration, model, seen)
