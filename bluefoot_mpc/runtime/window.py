@@ -111,11 +111,13 @@ def cut_window(run: RunData, start: float, end: float) -> Window | None:
     """The ticks of a run between two times (s), None where there are too few or no truth."""
     ticks = min(len(run.truth), len(run.telemetry), len(run.commands))
     time = np.array([sample.time for sample in run.truth[:ticks]])
-    inside = np.flatnonzero((time >= start - _TIME_TOLERANCE) & (time <= end + _TIME_TOLERANCE))
-    if len(inside) < _MIN_TICKS:
+    # The truth of an emulator in a process of its own may come late, and then stand beside two ticks.
+    is_new = np.diff(time, prepend=-np.inf) > 0.0
+    span = np.flatnonzero(is_new & (time >= start - _TIME_TOLERANCE) & (time <= end + _TIME_TOLERANCE))
+    if len(span) < _MIN_TICKS:
         return None
-    span = slice(int(inside[0]), int(inside[-1]) + 1)
-    telemetry, commands, samples = run.telemetry[span], run.commands[span], run.truth[span]
+    telemetry, commands = [run.telemetry[k] for k in span], [run.commands[k] for k in span]
+    samples = [run.truth[k] for k in span]
     q = _stack(samples, lambda s: s.q)
     return Window(
         samples=samples,

@@ -184,7 +184,7 @@ def make_emulated(resolved: Resolved, model: RobotModel, sitting: Posture, paced
     board = SensorBoard(MemoryLink(parts.board_device(), clock, BOARD_BAUD, "emulated board"), clock)
     lidar = parts.lidar_device()
     scanner = None if lidar is None else Lidar(MemoryLink(lidar, clock, LIDAR_BAUD, "emulated LIDAR"), clock)
-    devices = drivers(servos, clock, Calibration.nominal(model.parameters), board, scanner)
+    devices = drivers(servos, clock, Calibration.nominal(model.parameters), board, lidar=scanner)
     robot = ServoRobot(devices, clock, config)
     return RunRobot(
         robot=robot, truth=parts.plant.truth, drawn=parts.plant.drawn, devices=parts.report, parts=parts

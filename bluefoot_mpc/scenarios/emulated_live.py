@@ -61,7 +61,7 @@ class EmulatorProcess:
             raise DeviceError("the emulator's process did not start; its message stands above")
 
     def truth(self) -> TruthSample:
-        """The simulator's truth, at most 20 ms old."""
+        """The simulator's truth, some 5 ms old."""
         if self._newest is None:
             raise DeviceError("the emulator's process tells no truth")
         return self._newest
@@ -135,7 +135,8 @@ def make_emulated_live(resolved: Resolved, model: RobotModel, sitting: Posture) 
     try:
         robot = live_robot(
             config, Calibration.nominal(model.parameters), MonotonicClock(zero),
-            process.ports["servos"], process.ports["board"], on_close=process.close,
+            process.ports["servos"], process.ports["board"],
+            model=model.parameters.name, on_close=process.close,
         )  # fmt: skip
     except BaseException:
         process.close()

@@ -30,10 +30,8 @@ from bluefoot_mpc.settings import build
 from bluefoot_mpc.sim.body import Posture
 from bluefoot_mpc.sim.config import SimConfig
 
-TRUTH_PERIOD = 0.020
-"""s between two samples of the truth."""
 _BEAT = 0.005
-"""s after which the physics go on though nobody looked."""
+"""s after which the physics go on though nobody looked, and the truth is told."""
 _SWITCH = 0.0005
 """s that a thread of this process keeps the interpreter when another waits for it."""
 
@@ -86,15 +84,11 @@ def serve(order: Order, until: threading.Event) -> None:
             scanner = stack.enter_context(PtyLine(lidar, LIDAR_BAUD, lock=lock, clock=clock)).port
         _tell({"servos": [line.port for line in servos], "board": board.port, "lidar": scanner,
                "drawn": robot.plant.drawn})  # fmt: skip
-        next_truth = start
         while not until.wait(_BEAT):
-            now = clock.now()
             with lock:
-                robot.plant.advance(now)
-                sample = robot.plant.truth() if now >= next_truth else None
-            if sample is not None:
-                next_truth += TRUTH_PERIOD
-                _write(encode(sample))
+                robot.plant.advance(clock.now())
+                sample = robot.plant.truth()
+            _write(encode(sample))
         with lock:
             _tell({"report": robot.report()})
 

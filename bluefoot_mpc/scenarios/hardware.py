@@ -9,6 +9,7 @@ from bluefoot_mpc.io.board.driver import SensorBoard
 from bluefoot_mpc.io.calibration import Calibration, load_calibration
 from bluefoot_mpc.io.camera import Camera
 from bluefoot_mpc.io.clock import MonotonicClock
+from bluefoot_mpc.io.dynamixel.bus import BusConfig
 from bluefoot_mpc.io.lidar.driver import Lidar
 from bluefoot_mpc.io.serial_link import SerialLink
 from bluefoot_mpc.io.servo_robot.config import DevicesConfig
@@ -18,6 +19,9 @@ from bluefoot_mpc.io.servo_robot.port_watchdog import PortWatchdog
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.scenarios.config import Resolved
 from bluefoot_mpc.scenarios.robots import RunRobot
+
+PATIENT = BusConfig(tries=6)
+"""An ordinary machine pauses a program for some milliseconds now and then: no reason not to arm."""
 
 
 def make_hardware(resolved: Resolved, model: RobotModel) -> RunRobot:
@@ -41,7 +45,9 @@ def make_hardware(resolved: Resolved, model: RobotModel) -> RunRobot:
             "--robot hardware needs the sensor board's port: --set devices.board_port=/dev/ttyACM0"
         )
     calibration = load_calibration(config.calibration)
-    robot = live_robot(config, calibration, MonotonicClock(), config.ports, config.board_port)
+    robot = live_robot(
+        config, calibration, MonotonicClock(), config.ports, config.board_port, model=model.parameters.name
+    )
     return RunRobot(robot=robot)
 
 
@@ -51,6 +57,8 @@ def live_robot(
     clock: MonotonicClock,
     servos: Sequence[str],
     board: str,
+    *,
+    model: str,
     on_close: Callable[[], None] | None = None,
 ) -> LiveRobot:
     """Drivers on serial ports, in real time.
@@ -61,6 +69,7 @@ def live_robot(
         clock: for every stamp.
         servos: ports of the servos.
         board: port of the sensor board.
+        model: name of the robot's parameter set.
         on_close: called when the ports are given back.
 
     Raises:
@@ -77,10 +86,11 @@ def live_robot(
             opened.append(SerialLink(config.lidar_port, LIDAR_BAUD, clock))
             lidar = Lidar(opened[-1], clock)
         links, board_link = opened[: len(servos)], opened[len(servos)]
+        camera = Camera(config.camera, clock) if config.camera else None
+        board_driver = SensorBoard(board_link, clock)
         devices = drivers(
-            links, clock, calibration, SensorBoard(board_link, clock), lidar,
-            Camera(config.camera, clock) if config.camera else None,
-        )  # fmt: skip
+            links, clock, calibration, board_driver, lidar=lidar, camera=camera, model=model, bus=PATIENT
+        )
         watchdog = PortWatchdog(links, board_link)
         return LiveRobot(devices, clock, config, watchdog=watchdog, on_close=on_close)
     except BaseException:

@@ -27,9 +27,11 @@ def drivers(
     clock: Clock,
     calibration: Calibration,
     board: SensorBoard | None = None,
+    *,
     lidar: Lidar | None = None,
     camera: Camera | None = None,
     model: str = "bluefoot",
+    bus: BusConfig | None = None,
 ) -> Devices:
     """Drivers of the servos on their ports, under one closed latch, beside the other devices.
 
@@ -37,7 +39,7 @@ def drivers(
         ConfigurationError: joints cannot be spread over so many ports.
     """
     latch = Latch(closed=True)
-    buses = tuple(ServoBus(link, clock, BusConfig(), latch) for link in servos)
+    buses = tuple(ServoBus(link, clock, bus, latch) for link in servos)
     layout = spread(len(buses), calibration.ids)
     return Devices(
         buses=buses, cycle=BusCycle(buses, layout, clock), layout=layout, calibration=calibration,
