@@ -61,7 +61,6 @@
       const [roll, pitch, yaw] = state.rpy;
       drawHorizon(role("horizon"), roll, pitch, yaw);
       set("roll", degrees(roll)); set("pitch", degrees(pitch)); set("yaw", degrees(yaw));
-      set("attitude", `roll ${degrees(roll)} · pitch ${degrees(pitch)}`);
       plot.add(state.time, [roll * 180 / Math.PI, pitch * 180 / Math.PI]);
       plot.draw();
     }
