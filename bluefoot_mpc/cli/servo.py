@@ -119,12 +119,16 @@ def _new_id(command: SetupCommand, ports: ServoPorts, ids: Sequence[int], dialog
     question = f"Servo {old} ({joint_of_id(old)}) becomes servo {new} ({joint_of_id(new)}). Write it?"
     if not dialog.confirm(question):
         raise DeviceError(f"not agreed: {NOTHING_WRITTEN}")
+    # A file that cannot be read must be known before anything is written.
+    calibration = load_calibration(command.calibration) if command.calibration.is_file() else None
     facts = setting_up.change_id(ports, old, new)
-    stale = _make_stale(command)
+    if calibration is not None:
+        save_calibration(dataclasses.replace(calibration, setup=now_text()), command.calibration)
     page = [f"servo {old} is now {facts.part}"]
-    if stale:
+    if calibration is not None:
         page.append(f"{command.calibration} no longer holds. Calibrate again: bluefoot servo calibrate")
-    data = {"old_id": old, "new_id": new, "stale_calibration": str(command.calibration) if stale else None}
+    stale = None if calibration is None else str(command.calibration)
+    data = {"old_id": old, "new_id": new, "stale_calibration": stale}
     return Outcome(data=data, page=tuple(page))
 
 
@@ -145,15 +149,6 @@ def _require_some(ports: ServoPorts, ids: Sequence[int], found: Survey) -> None:
     """Tell a wrong baud rate from missing servos."""
     for finding in silence(ports, ids, found):
         raise DeviceError(f"{finding}; {NOTHING_WRITTEN}")
-
-
-def _make_stale(command: SetupCommand) -> bool:
-    """Note in the calibration, where there is one, that servos were given new IDs."""
-    if not command.calibration.is_file():
-        return False
-    calibration = load_calibration(command.calibration)
-    save_calibration(dataclasses.replace(calibration, setup=now_text()), command.calibration)
-    return True
 
 
 def _plan_table(changes: Sequence[setting_up.Change]) -> Table:

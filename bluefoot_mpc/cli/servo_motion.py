@@ -197,7 +197,7 @@ def _fit_table(found: Sequence[Identified], middle: Any) -> Table:
 
 def _cell(name: str, value: float, spread: float) -> str:
     scale = _UNITS[name][0]
-    more = "" if math.isnan(spread) else f" ± {scale * spread:.2g}"
+    more = "" if math.isnan(spread) else f"±{scale * spread:.1g}"
     return f"{scale * value:.3g}{more}"
 
 
