@@ -41,7 +41,7 @@ def deploy(command: DeployCommand) -> Outcome:
     if not command.dry_run:
         _require_ports(resolved)
     model = resolved.parameters.name
-    gates = [validation_gate(resolved, command.records, command.validate_words())]
+    gates = [validation_gate(resolved, options, command.records, command.validate_words())]
     gate, calibration = calibration_gate(devices, model)
     gates.append(gate)
     if command.dry_run or not any(gate.refuses for gate in gates):

@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bluefoot_mpc.evaluation.validation_gate import demand_of, judge
+from bluefoot_mpc.evaluation.validation_gate import demand_of, differences, judge
 from bluefoot_mpc.evaluation.validation_record import records_folder
-from bluefoot_mpc.evaluation.validation_subject import code_now, subject_in
+from bluefoot_mpc.evaluation.validation_subject import Subject, code_now, subject_in, subject_of
 from bluefoot_mpc.exceptions import ConfigurationError, DeviceError
 from bluefoot_mpc.io import calibration as cal
 from bluefoot_mpc.io.clock import MonotonicClock
@@ -21,6 +21,7 @@ from bluefoot_mpc.io.findings import Finding, Severity
 from bluefoot_mpc.io.serial_link import SerialLink
 from bluefoot_mpc.io.servo_robot.config import DevicesConfig
 from bluefoot_mpc.io.servo_robot.making import BOARD_BAUD
+from bluefoot_mpc.scenarios import RunOptions
 from bluefoot_mpc.scenarios.config import Resolved
 
 CONFIRMED = "yes"
@@ -59,11 +60,12 @@ def untried(name: str, why: str, mend: str = "") -> Gate:
     return Gate(name=name, findings=(finding,), is_open=None)
 
 
-def validation_gate(resolved: Resolved, records: Path | None, mend: str) -> Gate:
+def validation_gate(resolved: Resolved, options: RunOptions, records: Path | None, mend: str) -> Gate:
     """Whether a record allows this configuration, this code and this motion.
 
     Args:
         resolved: what would be run.
+        options: from which that was resolved.
         records: folder of the records; None for the usual one.
         mend: the command that makes a record.
     """
@@ -73,7 +75,16 @@ def validation_gate(resolved: Resolved, records: Path | None, mend: str) -> Gate
     if verdict.record is not None:
         text = f"passed on {verdict.record.made}: {verdict.record.file}"
         findings.insert(0, Finding(part="validation", text=text))
+    elif changes := list(differences(_own(options).identity(), subject.identity())):
+        text = f"the scenario itself changes the configuration: {'; '.join(changes[:5])}"
+        note = "Write these keys into the file of --config, and validate that file"
+        findings.append(Finding(part="validation", text=text, mend=note, severity=Severity.NOTE))
     return tried("validation", findings)
+
+
+def _own(options: RunOptions) -> Subject:
+    """The configuration without what a scenario changes of it."""
+    return subject_of(replace(options, duration=None, gait=None, speed=None))
 
 
 def calibration_gate(config: DevicesConfig, model: str) -> tuple[Gate, cal.Calibration | None]:

@@ -52,7 +52,8 @@ class Job:
         Raises:
             ConfigurationError: the folder cannot be written.
         """
-        file = self.out / f"config-{self.subject.sha256[:16]}.toml"
+        # Runs are kept by this name: neither another configuration nor other solvers may use them.
+        file = self.out / f"config-{self.subject.sha256[:16]}-{code_now().sha256[:8]}.toml"
         try:
             self.out.mkdir(parents=True, exist_ok=True)
         except OSError as error:

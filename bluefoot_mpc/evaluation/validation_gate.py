@@ -19,6 +19,7 @@ from bluefoot_mpc.evaluation.validation_record import (
     of_subject,
 )
 from bluefoot_mpc.evaluation.validation_subject import Code, Subject
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.io.findings import Finding, Severity
 from bluefoot_mpc.scenarios.base import Scenario
 from bluefoot_mpc.types import Mode
@@ -69,15 +70,24 @@ class Verdict:
 
 
 def demand_of(scenario: Scenario) -> Demand:
-    """What a scenario commands, sampled from its start to its end."""
+    """What a scenario commands, sampled from its start to its end.
+
+    Raises:
+        ConfigurationError: the scenario fails: it may be a user's code.
+    """
     speed, gaits, turns, poses = 0.0, set(), False, False
-    for time in np.arange(0.0, scenario.config.duration, _SAMPLING):
-        motion = scenario.command(float(time))
-        poses |= bool(np.any(motion.trunk.position) or np.any(motion.trunk.rpy))
-        if motion.mode is Mode.WALK:
-            speed = max(speed, math.hypot(*motion.velocity))
-            gaits.add(motion.gait)
-            turns |= motion.yaw_rate != 0.0
+    for time in np.arange(0.0, scenario.config.duration, _SAMPLING).tolist():
+        try:
+            motion = scenario.command(time)
+            poses |= bool(np.any(motion.trunk.position) or np.any(motion.trunk.rpy))
+            if motion.mode is Mode.WALK:
+                speed = max(speed, math.hypot(*motion.velocity))
+                gaits.add(motion.gait)
+                turns |= motion.yaw_rate != 0.0
+        except Exception as error:  # Whatever is wrong in it, it may be the user's own code.
+            raise ConfigurationError(
+                f"scenario '{scenario.name}' fails at {time:.2f} s: {type(error).__name__}: {error}"
+            ) from error
     return Demand(speed=speed, gaits=frozenset(gaits), turns=turns, poses=poses)
 
 
@@ -183,11 +193,10 @@ def _unvalidated(files: list[Path], folder: Path, subject: Subject, mend: str) -
 
 def _code_changes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
     """Files and versions that are not the same."""
-    for name in sorted({*old["files"], *new["files"]}):
-        if old["files"].get(name) != new["files"].get(name):
-            yield name
+    before, now = old.get("files", {}), new["files"]
+    yield from (name for name in sorted({*before, *now}) if before.get(name) != now.get(name))
     for key in ("package", "versions"):
-        yield from differences({key: old[key]}, {key: new[key]})
+        yield from differences({key: old.get(key)}, {key: new[key]})
 
 
 def _some(changes: list[str]) -> str:

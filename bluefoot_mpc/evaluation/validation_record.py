@@ -94,7 +94,7 @@ def record_table(
         "format": FORMAT,
         **extra,
         "passed": all(case["passed"] for case in cases),
-        "plan": {"speed": plan.speed, "gait": plan.gait, "seeds": plan.seeds, "quick": plan.quick},
+        "plan": _plan_table(plan),
         "subject_sha256": subject.sha256,
         "subject": subject.identity(),
         "code": code.as_plain(),
@@ -149,9 +149,17 @@ def load_record(file: Path) -> Record:
         raise RecordError(f"{file} is no record of a validation")
     if table["format"] != FORMAT:
         raise RecordError(f"{file} was written by another version (format {table['format']})")
+    if any(not isinstance(table[key], dict) for key in ("subject", "plan", "code")):
+        raise RecordError(f"{file} is no record of a validation")
     if table["sha256"] != own_hash(table) or table["subject_sha256"] != table_hash(table["subject"]):
         raise RecordError(f"{file} does not fit its own hash: it was edited or damaged")
-    if table["passed"] != _passes(table["cases"]):
+    try:
+        is_consistent = _plan_table(Plan(**table["plan"])) == table["plan"] and (
+            table["passed"] == _passes(table["cases"])
+        )
+    except (TypeError, KeyError, AttributeError, ConfigurationError) as error:
+        raise RecordError(f"{file} is no record of a validation: {error!r}") from error
+    if not is_consistent:
         raise RecordError(f"{file} contradicts itself: its cases do not say what it says of them")
     return Record(file=file, table=table)
 
@@ -165,6 +173,10 @@ def find_records(folder: Path) -> Iterable[Path]:
 def of_subject(files: Iterable[Path], sha256: str) -> list[Path]:
     """Files that claim to be of a configuration."""
     return [file for file in files if file.name.startswith(sha256[:_SHORT])]
+
+
+def _plan_table(plan: Plan) -> dict[str, Any]:
+    return {"speed": plan.speed, "gait": plan.gait, "seeds": plan.seeds, "quick": plan.quick}
 
 
 def _case(verdict: Verdict) -> dict[str, Any]:

@@ -98,10 +98,15 @@ class Code:
 
     def as_plain(self) -> dict[str, Any]:
         """Plain values, for a record."""
-        return {
-            "package": self.package, "source": self.source, "versions": dict(self.versions),
-            "files": dict(self.files),
-        }  # fmt: skip
+        return {**self._identity(), "files": dict(self.files)}
+
+    @property
+    def sha256(self) -> str:
+        """Hash of all that makes it this code."""
+        return table_hash(self._identity())
+
+    def _identity(self) -> dict[str, Any]:
+        return {"package": self.package, "source": self.source, "versions": dict(self.versions)}
 
 
 def code_now() -> Code:

@@ -201,6 +201,15 @@ def test_faster_than_validated_is_refused(rig, capfd):
     assert "--scenario-speed 0.1" in gates["validation"]["findings"][0]["mend"]
 
 
+def test_a_scenario_that_changes_the_controller_says_so(rig, capfd):
+    words = ["--scenario", "level", "--controller", "mpc", "--speed", "0.05", "--dry-run"]
+    status, gates, _ = look(rig, capfd, *words)
+    assert status == 3
+    note = next(f for f in gates["validation"]["findings"] if f["severity"] == "note")
+    assert "control.leveling.enabled: False -> True" in note["text"]
+    assert "--config" in note["mend"]
+
+
 def test_another_bus_rate_is_another_configuration(rig, capfd):
     status, gates, _ = look(rig, capfd, "--baud", "500000", "--dry-run")
     assert status == 3

@@ -85,7 +85,7 @@ def test_another_configuration_or_speed_is_run_anew(calls, tmp_path):
 
 
 def test_code_that_changes_meanwhile_leaves_no_record(calls, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "code_now", iter([CODE, None]).__next__)
+    monkeypatch.setattr(module, "code_now", iter([CODE, CODE, None]).__next__)
     with pytest.raises(ConfigurationError, match="code was changed"):
         run(tmp_path, quick=True)
     assert not (tmp_path / "records").exists()

@@ -2,11 +2,14 @@
 
 import dataclasses
 
+import orjson
 import pytest
 
 from bluefoot_mpc.evaluation.validation_gate import Demand, demand_of, differences, judge
 from bluefoot_mpc.evaluation.validation_plan import Plan
+from bluefoot_mpc.evaluation.validation_record import own_hash
 from bluefoot_mpc.evaluation.validation_subject import subject_of
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.io.findings import Severity
 from bluefoot_mpc.scenarios import RunOptions, find_scenario
 from tests.evaluation.validated import CODE, made_up
@@ -117,6 +120,23 @@ def test_demands_are_what_scenarios_command():
     assert demand("turn").turns
     assert demand("pose").poses
     assert demand("transition").gaits == {"trot", "walk"}
+
+
+def test_a_scenario_that_fails_is_told():
+    class Broken(find_scenario("stand")):
+        def command(self, time):
+            return time
+
+    with pytest.raises(ConfigurationError, match=r"fails at 0\.00 s: AttributeError"):
+        demand_of(Broken())
+
+
+@pytest.mark.parametrize("code", [{}, {"files": {}}, {"source": 3, "versions": 4}])
+def test_code_that_is_not_told_is_other_code(tmp_path, code):
+    record = made_up(tmp_path)
+    table = {**record.table, "code": code}
+    record.file.write_bytes(orjson.dumps({**table, "sha256": own_hash(table)}))
+    assert "the code is not the one" in refusal(look(tmp_path))
 
 
 def test_differences_name_new_and_missing_keys():

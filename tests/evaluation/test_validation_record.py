@@ -77,6 +77,18 @@ def test_a_new_hash_does_not_make_a_failure_pass(tmp_path):
         load_record(record.file)
 
 
+@pytest.mark.parametrize("key", ["cases", "plan", "subject", "passed", "code", "made"])
+@pytest.mark.parametrize("value", [None, 3, "x", [], [1], {}, {"a": []}])
+def test_nonsense_with_the_right_hash_is_refused_too(tmp_path, key, value):
+    record = made_up(tmp_path)
+    change(record, lambda t: t.update({key: value}), rehash=True)
+    if key == "made" or (key == "code" and isinstance(value, dict)):
+        load_record(record.file)  # no date or code that anything would be compared with
+        return
+    with pytest.raises(RecordError):
+        load_record(record.file)
+
+
 def test_a_configuration_cannot_be_swapped(tmp_path):
     record = made_up(tmp_path)
     change(record, lambda t: t["subject"]["safety"].update(voltage_warn=9.0), rehash=True)
