@@ -12,6 +12,7 @@ from bluefoot_mpc.codegen.compiler import CodegenUnavailable, find_compiler
 from bluefoot_mpc.codegen.config import CodegenConfig
 from bluefoot_mpc.io.findings import Finding, Severity
 from bluefoot_mpc.io.serial_link import available_ports
+from bluefoot_mpc.tuning.identify import SYSID_NEEDS
 
 _OLDEST_PYTHON = (3, 11)
 _RENDER = (
@@ -50,11 +51,11 @@ def _packages() -> list[Finding]:
 
 def _identification() -> Finding:
     """`mujoco.sysid` has needs of its own."""
-    missing = [name for name in ("absl-py", "colorama", "tabulate", "pyyaml") if not _is_installed(name)]
+    missing = [name for name in SYSID_NEEDS if not _is_installed(name)]
     if missing:
-        text = f"bluefoot servo identify cannot fit without: {', '.join(missing)}"
-        mend = f"Install them: pip install {' '.join(missing)}"
-        return Finding(part="identification", text=text, mend=mend, severity=Severity.WARNING)
+        text = f"mujoco.sysid lacks {', '.join(missing)}: servos are fitted with SciPy alone"
+        mend = f"To use it: pip install {' '.join(missing)}"
+        return Finding(part="identification", text=text, mend=mend, severity=Severity.NOTE)
     return Finding(part="identification", text="mujoco.sysid can be used")
 
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from bluefoot_mpc.exceptions import ConfigurationError, DeviceError
 from bluefoot_mpc.io.commissioning.steps import StepRecord
@@ -37,6 +38,9 @@ _TOLERANCE = 1e-5
 """Relative change of variables or of the cost at which a fit ends: far below what readings can tell."""
 _POOR_FIT = 1.5
 """Counts of rms residual above which the law does not describe the servo."""
+
+SYSID_NEEDS = ("absl-py", "colorama", "tabulate", "pyyaml")
+"""Packages without which `mujoco.sysid` is empty."""
 
 _Progress = Callable[[], None]
 
@@ -217,38 +221,46 @@ def _scales(servo: ServoParameters) -> tuple[FloatArray, FloatArray]:
 
 def _fitted(records: Sequence[StepRecord], bench: Bench, iterations: int, start: ServoFit) -> ServoFit:
     """Least squares over all readings of moving shafts."""
-    sysid = _sysid()
     scale, offset = _scales(bench.servo)
     low, high = ((vector(end) + offset) / scale for end in limits_of(bench.servo))
     moving = [_trimmed(record) for record in records]
     simulated = StepBench(moving, bench)
     begin = np.clip((vector(start) + offset) / scale, low + 1e-3 * (high - low), high - 1e-3 * (high - low))
 
-    def residual(x: FloatArray, _: Any) -> tuple[list[FloatArray], None, None]:
+    def residual(x: FloatArray, _: Any = None) -> tuple[list[FloatArray], None, None]:
         curves = simulated.at_readings(_of_vector(np.ravel(x) * scale - offset))
         return [curve - r.position for curve, r in zip(curves, moving, strict=True)], None, None
 
+    options = {"diff_step": _FD_STEP, "x_scale": "jac", "xtol": _TOLERANCE, "ftol": _TOLERANCE}
+    sysid = load_sysid()
+    if sysid is None:
+        found = least_squares(
+            lambda x: np.concatenate(residual(x)[0]),
+            begin,
+            bounds=(low, high),
+            max_nfev=iterations,
+            **options,
+        ).x
+        return _of_vector(found * scale - offset)
     parameters = sysid.ParameterDict({
         name: sysid.Parameter(name, begin[k], low[k], high[k]) for k, name in enumerate(NAMES)
     })  # fmt: skip
     # Its back end tells about every iteration, and that cannot be switched off.
     with contextlib.redirect_stdout(io.StringIO()):
-        found, _ = sysid.optimize(
-            parameters, residual, optimizer="scipy", verbose=False, max_iters=iterations,
-            diff_step=_FD_STEP, x_scale="jac", xtol=_TOLERANCE, ftol=_TOLERANCE,
-        )  # fmt: skip
-    return _of_vector(found.as_vector() * scale - offset)
+        fitted, _ = sysid.optimize(
+            parameters, residual, optimizer="scipy", verbose=False, max_iters=iterations, **options
+        )
+    return _of_vector(fitted.as_vector() * scale - offset)
 
 
-def _sysid() -> Any:
-    """`mujoco.sysid`, whose own dependencies are optional parts of MuJoCo."""
+def load_sysid() -> Any:
+    """`mujoco.sysid`, or None: what it needs itself (`SYSID_NEEDS`) are optional parts of MuJoCo.
+
+    Its least squares are SciPy's, so that without it the same fit is made directly.
+    """
     # Its type marker makes checkers take MuJoCo for nothing but this package: imported by name.
     sysid: Any = importlib.import_module("mujoco.sysid")
-    if not hasattr(sysid, "optimize"):
-        raise ConfigurationError(
-            "mujoco.sysid lacks what it needs: install the packages absl-py, colorama, tabulate and pyyaml"
-        )
-    return sysid
+    return sysid if hasattr(sysid, "optimize") else None
 
 
 def _jackknife(parts: Sequence[FloatArray]) -> FloatArray:

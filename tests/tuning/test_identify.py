@@ -75,6 +75,14 @@ def test_the_whole_plan_finds_parameters_with_friction_under_load(changes, gain,
     assert spread.stiffness < 0.05 * fit.stiffness
 
 
+def test_without_sysid_the_fit_is_the_same(monkeypatch):
+    records = made_up(dataclasses.replace(start_of(bench_servo()), stiffness=11.0, latency=0.01))
+    bench, config = Bench(servo=bench_servo()), IdentifyConfig(groups=0)
+    with_it = vector(identify(records, bench, config).fit)
+    monkeypatch.setattr("bluefoot_mpc.tuning.identify.load_sysid", lambda: None)
+    assert vector(identify(records, bench, config).fit) == pytest.approx(with_it, rel=1e-6)
+
+
 @pytest.mark.slow
 def test_a_weight_on_a_lever_enters_the_fit():
     load = {"load_inertia": 0.004, "gravity": 0.25, "gravity_angle": 0.0}
