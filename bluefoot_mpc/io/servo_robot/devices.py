@@ -45,6 +45,7 @@ _STILL_ON = Finding(
     mend="Unplug the servos' battery",
     severity=Severity.REFUSAL,
 )
+_NOW = 0.0
 _CUT_TIME = 0.3
 """s in which the board must say that the supply is off."""
 _TRIES = 5
@@ -106,27 +107,39 @@ class DeviceCycle:
         What is missing is left to the check before arming.
         """
         self.may_move = False
-        devices, clock = self._devices, self._clock
+        devices = self._devices
         if devices.lidar is not None:
             # The robot walks without it; the check before arming tells.
             with contextlib.suppress(LidarError):
                 devices.lidar.start()
         if devices.camera is not None:
             devices.camera.open()
-        if devices.board is not None:
-            devices.board.power(True)
-            devices.board.wait_power(True, self._config.connect_time)
-            clock.sleep_until(clock.now() + _BOOT)
-            devices.board.beat()
+        self._supply()
         self.restart()
         return self.collect()
+
+    def _supply(self) -> None:
+        """Have the servos' supply on, and give them time to start."""
+        board, clock = self._devices.board, self._clock
+        if board is not None:
+            board.power(True)
+            board.wait_power(True, self._config.connect_time)
+            clock.sleep_until(clock.now() + _BOOT)
+            board.beat()
 
     def restart(self) -> None:
         """Begin a new period now."""
         self._due = self._clock.now()
 
     def check(self) -> tuple[Finding, ...]:
-        """Everything that must hold before torque; writes nothing."""
+        """Everything that must hold before torque; writes nothing.
+
+        A robot that was stopped gets its servos' supply back for it.
+        """
+        if self._devices.board is not None and not self._devices.board.wait_power(True, _NOW):
+            self._supply()
+            self.restart()
+            self.collect()
         devices, config = self._devices, CheckConfig(least_voltage=self._config.arming_voltage)
         found = [*calibration_findings(devices.calibration, devices.model)]
         found += devices.board.findings() if devices.board is not None else [_NO_BOARD]
@@ -190,9 +203,10 @@ class DeviceCycle:
             self._devices.board.cut()
 
     def close(self) -> None:
-        """Hear whether the servos' supply is off, and give back every port."""
+        """Cut the servos' supply, hear whether it is off, and give back every port."""
         devices = self._devices
         if devices.board is not None and self._joints is not None:
+            devices.board.cut()
             devices.board.wait_power(False, _CUT_TIME)
         for bus in devices.buses:
             bus.link.close()
