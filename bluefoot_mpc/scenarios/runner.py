@@ -221,7 +221,10 @@ def _station(
 
     with StationLink(options.station) as link:
         # A station leads only where nothing else does.
-        yield StationedRun(link, source, leads=not resolved.scenario.scripted, powered=on.rests)
+        leads = not resolved.scenario.scripted
+        # In memory all devices share one thread with the loop; another one must not touch them.
+        direct = resolved.run.robot == "hardware" or resolved.stages.devices.link == "pty"
+        yield StationedRun(link, source, leads=leads, powered=on.rests, direct=direct)
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from bluefoot_mpc.types import Mode, MotionCommand, SafetyRequest, SensorFrame, 
 
 LIMP = frozenset({"disarmed", "checking", "stopped", "emergency"})
 """States of the supervisor in which no torque is on."""
+EMERGENCY = "emergency"
 
 
 class Supervised(Protocol):
@@ -42,23 +43,34 @@ class StationedRun:
         own: the run's own commands; when they end, so does the run.
         leads: True where the station commands, as long as the run's own commands last.
         powered: True for robots that are disarmed for good by a stop: the run then ends.
+        direct: True for robots that bear to be stopped by another thread than the loop's; for others
+            (everything on a virtual clock) the loop itself does it, on its next tick.
     """
 
     def __init__(
-        self, link: StationLink, own: CommandSource, *, leads: bool = False, powered: bool = False
+        self,
+        link: StationLink,
+        own: CommandSource,
+        *,
+        leads: bool = False,
+        powered: bool = False,
+        direct: bool = False,
     ) -> None:
-        self._link, self._own, self._powered = link, own, powered
+        self._link, self._own, self._powered, self._direct = link, own, powered, direct
         self._led = LinkSource(link) if leads else None
         self._supervisor: Supervised | None = None
 
     def attach(self, supervisor: Supervised) -> None:
         """Tell whose state is published, and who carries out an emergency stop."""
         self._supervisor = supervisor
-        self._link.on_emergency(supervisor.emergency)
+        if self._direct:
+            self._link.on_emergency(supervisor.emergency)
 
     def __call__(self, time: float) -> MotionCommand | None:
         """The command; none but rest once the operator has stopped the robot."""
         link = self._link
+        if link.emergency_requested and self._supervisor is not None and self._state != EMERGENCY:
+            self._supervisor.emergency("asked for by the ground station")
         if link.arm_requested:
             link.arm_done(self._refusal())
         if link.stop_requested or link.emergency_requested:

@@ -104,12 +104,27 @@ def test_an_old_command_is_tamed_and_told():
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("direct", [True, False])
+def test_an_emergency_is_carried_out_by_the_thread_that_may(direct):
+    link, heard = Link(), []
+    run_ = StationedRun(link, own, direct=direct)
+    boss = supervisor()
+    boss.emergency = heard.append
+    run_.attach(boss)
+    assert (link.emergency is boss.emergency) is direct
+    link.emergency_requested = True
+    run_(1.0)
+    assert heard == ["asked for by the ground station"]
+    boss.state = "emergency"
+    run_(1.02)
+    assert len(heard) == 1
+
+
 def test_state_and_reasons_are_published():
     link = Link()
     run_ = StationedRun(link, own, powered=True)
     boss = supervisor("sitting", ("battery low",))
     run_.attach(boss)
-    assert link.emergency is boss.emergency
     command = SimpleNamespace(torque_limit=np.ones(16))
     output = SimpleNamespace(telemetry=SimpleNamespace(mode=Mode.SIT), command=command)
     run_.observe(None, output, None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,6 +16,9 @@ from bluefoot_mpc.io.station.signing import Signer, load_key
 from bluefoot_mpc.io.station.telemetry import Snapshot
 from bluefoot_mpc.io.station.transport import Address, open_transport
 from bluefoot_mpc.types import MotionCommand, SensorFrame, Telemetry
+
+_GOODBYE = 0.2
+"""s that the last words get to leave."""
 
 
 class StationLink:
@@ -48,6 +52,7 @@ class StationLink:
         transport = open_transport(place)
         self.name = transport.name
         self._seen: tuple[str, tuple[str, ...]] = ("", ())
+        self._closed = False
         self._pump = Pump("station link", transport, self._end, self._clock)
 
     def publish(
@@ -114,7 +119,13 @@ class StationLink:
         return any(guard.taken for guard in self._end.guards)
 
     def close(self) -> None:
-        """End the thread and give the port back. Idempotent."""
+        """Say goodbye, end the thread and give the port back. Idempotent."""
+        if not self._closed:
+            self._closed = True
+            self._end.farewell()
+            end = time.monotonic() + _GOODBYE
+            while self._end.writer.waiting and time.monotonic() < end:
+                time.sleep(0.01)
         self._pump.close()
 
     def __enter__(self) -> StationLink:

@@ -94,6 +94,11 @@ class RobotEnd:
         if reason:
             self.say(mavlink.MAV_SEVERITY_ERROR, f"not armed: {reason}")
 
+    def farewell(self) -> None:
+        """Say that nothing more will come, before everything else."""
+        for message in tell.farewell():
+            self.writer.answer(message)
+
     def receive(self, data: bytes, now: float) -> int:
         """Take bytes from the line; gives the number of messages that were the station's own."""
         count = 0

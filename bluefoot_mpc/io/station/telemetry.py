@@ -89,6 +89,13 @@ def heartbeat(snapshot: Snapshot | None) -> Any:
     )
 
 
+def farewell() -> list[Any]:
+    """What a robot says whose program ends: a text, and a heartbeat that has no torque and powers off."""
+    beat = heartbeat(None)
+    beat.system_status = mavlink.MAV_STATE_POWEROFF
+    return [*texts(mavlink.MAV_SEVERITY_NOTICE, "the robot's program ends", 0), beat]
+
+
 def attitude(snapshot: Snapshot) -> Any:
     """ATTITUDE: roll, pitch, yaw (rad, FRD against NED) and body rates (rad/s, FRD)."""
     estimate = snapshot.telemetry.estimate

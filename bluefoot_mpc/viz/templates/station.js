@@ -44,7 +44,7 @@
   function show() {
     const link = state.link, lost = link.age === null || link.age > 1.5;
     set("link", link.age === null ? "no robot yet" : lost ? `lost for ${link.age.toFixed(0)} s` : "connected", lost ? "bad" : "good");
-    const alarm = state.alarm >= 6 ? "bad" : state.alarm === 5 ? "warn" : "good";
+    const alarm = [6, 8].includes(state.alarm) ? "bad" : state.alarm === 5 ? "warn" : "good";
     set("mode", state.mode ? `${state.mode}${state.mode === "walk" ? " · " + state.gait : ""}` : "–", lost || !state.mode ? "" : alarm);
     set("armed", state.mode ? (state.armed ? "torque on" : "torque off") + (state.state ? ` · ${state.state}` : "") : "–", state.armed && !lost ? "warn" : "");
     set("voltage", state.voltage === null ? "–" : `${state.voltage.toFixed(2)} V`, state.voltage === null ? "" : state.voltage < 10.2 ? "bad" : state.voltage < 10.8 ? "warn" : "");

@@ -263,6 +263,16 @@ def test_closing_twice_is_fine_and_ends_the_thread(station):
     assert not [thread for thread in threading.enumerate() if thread.name == "station link"]
 
 
+def test_a_robot_that_ends_says_goodbye(station):
+    with StationLink(station.address) as link:
+        publish(link)
+        assert station.hear("HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    assert station.hear("STATUSTEXT").text == "the robot's program ends"
+    last = station.hear("HEARTBEAT")
+    assert not last.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    assert last.system_status == mavlink.MAV_STATE_POWEROFF
+
+
 @pytest.fixture
 def both(tmp_path):
     """A station and a robot that hear each other."""
