@@ -175,12 +175,12 @@ class PortCycle:
         while self._at < len(self._jobs) and not begun:
             servo, kind, is_last = self._jobs[self._at]
             self._begun = self._clock.now()
-            if self._begun + self._typical > deadline:
+            count = self.wire.free_count(servo.id, kind.lengths)
+            if self._begun + self._needed(count) > deadline:
                 for left, which, _ in self._jobs[self._at :]:
                     self._put_off(left, which)
                 break
             self._at += 1
-            count = self.wire.free_count(servo.id, kind.lengths)
             if count is None:
                 self._miss(servo)
                 continue
@@ -193,6 +193,11 @@ class PortCycle:
         if self.wire.doubted:
             self._withdraw()
         return begun
+
+    def _needed(self, count: int | None) -> float:
+        """Seconds that a reply with so many parameters takes: what comes next must not talk over its end."""
+        on_the_line = 0.0 if count is None else self.wire.timeout(8, count) - self.wire.patience
+        return max(self._typical, on_the_line)
 
     def _put_off(self, servo: ServoState, kind: Kind) -> None:
         """Ask it first in the next cycle."""
