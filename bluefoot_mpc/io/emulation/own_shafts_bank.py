@@ -22,8 +22,8 @@ STEP = 1e-3
 """s, physics step."""
 
 _NO_RAMP = 1e9
-_LOAD_FRICTION_SPEED = 0.1
-"""rad/s at which the load-dependent friction has halved."""
+_LOAD_FRICTION_SPEED = 0.5
+"""rad/s at which the load-dependent friction has halved, as in the simulator."""
 _HEAT_STEPS = 20
 
 

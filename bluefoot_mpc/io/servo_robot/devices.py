@@ -19,6 +19,7 @@ from bluefoot_mpc.io.dynamixel import arming, units
 from bluefoot_mpc.io.dynamixel.arming import CheckConfig
 from bluefoot_mpc.io.dynamixel.bus import ServoBus
 from bluefoot_mpc.io.dynamixel.cycle import BusCycle, Readings
+from bluefoot_mpc.io.dynamixel.errors import ServoError
 from bluefoot_mpc.io.dynamixel.layout import ServoLayout
 from bluefoot_mpc.io.findings import Finding, Severity
 from bluefoot_mpc.io.lidar.driver import Lidar
@@ -141,7 +142,7 @@ class DeviceCycle:
             self.restart()
             self.collect()
         devices, config = self._devices, CheckConfig(least_voltage=self._config.arming_voltage)
-        found = [*calibration_findings(devices.calibration, devices.model)]
+        found: list[Finding] = []
         found += devices.board.findings() if devices.board is not None else [_NO_BOARD]
         found += devices.lidar.findings() if devices.lidar is not None else ()
         found += devices.camera.findings() if devices.camera is not None else ()
@@ -149,8 +150,19 @@ class DeviceCycle:
             joints = range(4 * leg, 4 * leg + 4)
             found += arming.check_servos(devices.buses, devices.layout, config, joints)
             self._beat()
+        found += calibration_findings(devices.calibration, devices.model, self._identities())
         # Ports are looked at once for each leg.
         return tuple({(finding.part, finding.text): finding for finding in found}.values())
+
+    def _identities(self) -> dict[int, tuple[int, int]]:
+        """Model number and firmware of the servos that answer, by ID."""
+        layout, seen = self._devices.layout, {}
+        for servo, port in zip(layout.ids, layout.ports, strict=True):
+            # One that is silent has its finding already.
+            with contextlib.suppress(ServoError):
+                block = self._devices.buses[port].read_block(servo, 0, 3, tries=1)
+                seen[servo] = (block[0] | block[1] << 8, block[2])
+        return seen
 
     def arm(self, torque_limit: float) -> None:
         """Hold the present position with a low torque limit.
