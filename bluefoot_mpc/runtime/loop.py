@@ -156,7 +156,7 @@ def _ticks(
             _ramp_down(robot, data, frame, hooks.rests)
             raise
         frame = robot.step(output.command)
-        reason = ending.reason(robot, telemetry.mode, now, hooks.rests)
+        reason = ending.reason(robot, telemetry.mode, motion.mode if hooks.rests else None, now)
         if reason is not None:
             return reason or _safe_reason(data)
 
@@ -180,8 +180,15 @@ class _Ending:
         self.cut_short = why
         self.resting_since = now
 
-    def reason(self, robot: SafetySupervisor, mode: Mode, now: float, rests: bool) -> str | None:
-        """Why the run is over now, empty where the controller's account tells it; None while it is not."""
+    def reason(self, robot: SafetySupervisor, mode: Mode, wanted: Mode | None, now: float) -> str | None:
+        """Why the run is over now, empty where the controller's account tells it; None while it is not.
+
+        Args:
+            robot: the supervised robot.
+            mode: that the controller is in.
+            wanted: mode that was asked for; None for a robot that need not be armed.
+            now: s since the start.
+        """
         if robot.state is SafetyState.EMERGENCY:
             return robot.request.reasons[-1] if robot.request.reasons else "emergency stop"
         if mode is Mode.SAFE:
@@ -189,7 +196,9 @@ class _Ending:
             if robot.limp and now - self.stopping_since >= AFTER_FALL:
                 return ""
         if self.cut_short is None:
-            return "" if rests and robot.stopped else None
+            if wanted is None or not robot.stopped:
+                return None
+            return COMPLETED if wanted is Mode.OFF else ""
         return self.cut_short if robot.limp or now - self.resting_since > REST_TIMEOUT else None
 
 

@@ -114,7 +114,7 @@ def test_wrong_use_is_one_message_that_names_what_is_valid(words, named):
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        (["--robot", "emulator"], ["emulator", "sim"]),
+        (["--robot", "spot"], ["spot", "emulator, hardware, sim"]),
         (["--controller", "lqr"], ["lqr", "mpc", "cpg"]),
         (["--randomize", "lots"], ["lots", "none", "standard"]),
         (["--gait", "canter"], ["canter", "trot", "walk"]),
