@@ -34,7 +34,11 @@ def validate(command: ValidateCommand) -> Outcome:
     status = OK if record.passed else FAILED
     deployable = record.passed and job.plan.is_full
     data = {**record.table, "record": record.file, "deployable": deployable, "exit_status": status}
-    return Outcome(status=status, data=data, page=validation_page(record, command.run_fields()["config"]))
+    return Outcome(
+        status=status,
+        data=data,
+        page=validation_page(record, command.run_fields()["config"], command.deploy_words()),
+    )
 
 
 @contextmanager

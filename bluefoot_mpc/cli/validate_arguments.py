@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -77,3 +78,10 @@ class ValidateCommand(Common):
         """What chooses the configuration, by the names that RunOptions gives it."""
         config = next(iter(self.config_file), self.config)
         return {"config": config, "model": self.model, "controller": self.controller}
+
+    def deploy_words(self) -> str:
+        """The command that deploys what was validated."""
+        words = ["bluefoot", "deploy"]
+        for option, value in {**self.run_fields(), "records": self.records}.items():
+            words += [f"--{option}", str(value)] if value is not None else []
+        return shlex.join([*words, "--dry-run"])

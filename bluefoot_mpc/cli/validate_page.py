@@ -15,12 +15,13 @@ from bluefoot_mpc.evaluation.validation_plan import LEAST_SEEDS
 from bluefoot_mpc.evaluation.validation_record import Record
 
 
-def validation_page(record: Record, config: Path | None) -> tuple[RenderableType, ...]:
+def validation_page(record: Record, config: Path | None, deploy: str) -> tuple[RenderableType, ...]:
     """Every case with its limits, then what it means.
 
     Args:
         record: the validation.
         config: the file that was validated; None for the configuration that ships.
+        deploy: the command that deploys it.
     """
     table = record.table
     plan = record.plan
@@ -31,7 +32,7 @@ def validation_page(record: Record, config: Path | None) -> tuple[RenderableType
     return (
         head,
         _cases(table["cases"]),
-        *_verdict(record, config),
+        *_verdict(record, deploy),
         f"record         {record.file}\nconfiguration  {table['subject_sha256'][:16]}\n"
         f"code           {table['code']['source']} (version {table['code']['package']})",
     )
@@ -57,7 +58,7 @@ def _mark(limit: Mapping[str, Any]) -> Text:
     return Text("yes", style="green") if limit["holds"] else Text("NO", style="bold red")
 
 
-def _verdict(record: Record, config: Path | None) -> tuple[RenderableType, ...]:
+def _verdict(record: Record, deploy: str) -> tuple[RenderableType, ...]:
     if not record.passed:
         broken = record.broken
         return (Text(f"FAILED: {len(broken)} limit(s) broken: not to be deployed\n", style="bold red"),)
@@ -67,5 +68,4 @@ def _verdict(record: Record, config: Path | None) -> tuple[RenderableType, ...]:
             f"validate without --quick, with {LEAST_SEEDS} seeds or more\n"
         )
         return (Text(text, style="yellow"),)
-    given = f" --config {config}" if config else ""
-    return (Text(f"PASSED: may be deployed: bluefoot deploy{given} --dry-run shows how\n", style="green"),)
+    return (Text(f"PASSED: may be deployed; what that takes shows: {deploy}\n", style="green"),)
