@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 
 from rich.table import Table
 
@@ -12,6 +13,8 @@ from bluefoot_mpc.cli.summary import summary_page
 from bluefoot_mpc.runtime.data import happenings
 from bluefoot_mpc.scenarios import RunOptions, RunResult, scenario_names
 from bluefoot_mpc.scenarios import run as run_scenario
+
+log = logging.getLogger(__name__)
 
 
 def list_scenarios(_: ListCommand) -> Outcome:
@@ -25,6 +28,8 @@ def list_scenarios(_: ListCommand) -> Outcome:
 
 def run(command: RunCommand) -> Outcome:
     """Run a scenario by name or script."""
+    if command.robot == "hardware":
+        log.warning("nothing asks here whether this configuration was validated; bluefoot deploy does")
     return outcome_of(run_scenario(command.scenario, RunOptions(**command.run_fields())))
 
 

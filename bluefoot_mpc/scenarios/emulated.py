@@ -125,7 +125,8 @@ class EmulatedRobot:
 
     def report(self) -> dict[str, Any]:
         """What the devices saw of their driver: plain values."""
-        servos = [servo for line in self.lines for servo in line.all]
+        # Without their supply servos are limp, whatever their registers said last.
+        servos = [servo for line in self.lines if line.is_powered for servo in line.all]
         kinds: dict[str, int] = {}
         for line in self.lines:
             for kind, count in line.violation_kinds.items():
