@@ -79,7 +79,10 @@ class EmulatorProcess:
             self._process.wait(timeout=5.0)
         except subprocess.TimeoutExpired:
             self._process.kill()
+            self._process.wait()
         self._reader.join(timeout=2.0)
+        if self._process.stdout is not None:
+            self._process.stdout.close()
 
     def _read(self) -> None:
         stream = self._process.stdout
@@ -142,5 +145,6 @@ def make_emulated_live(resolved: Resolved, model: RobotModel, sitting: Posture) 
         process.close()
         raise
     return RunRobot(
-        robot=robot, truth=process.truth, drawn=process.ports["drawn"], devices=lambda: process.report
-    )
+        robot=robot, truth=process.truth, drawn=process.ports["drawn"],
+        devices=lambda: {**process.report, "in_real_time": True},
+    )  # fmt: skip
