@@ -42,6 +42,8 @@ SLOWEST = 1.0 / 45.0
 """s that a period may take: 45 Hz at least."""
 _SYNC_WRITE, _REG_WRITE, _WRITE = 0x83, 4, 3
 _GOAL, _ENABLE = 30, 24
+_BYTE = 1e-5
+"""s of a byte on the servos' line."""
 _AFTER = 0.3
 """s for which the devices live on after the run, so that what was sent last takes effect."""
 
@@ -49,11 +51,18 @@ Action = Callable[["Rig"], None]
 
 
 class LineWatch:
-    """What a servo line is told that could move a servo, read from the bytes themselves."""
+    """What a servo line is told that could move a servo, read from the bytes themselves.
+
+    Attributes:
+        goals: s, beginning of each packet that writes goals.
+        enables: s, beginning of each packet that enables torque.
+        counts: goals of each sync write: s, and counts by servo ID.
+    """
 
     def __init__(self, parts: EmulatedRobot) -> None:
         self.goals: list[float] = []
         self.enables: list[float] = []
+        self.counts: list[tuple[float, dict[int, int]]] = []
         line = parts.lines[0]
         receive = line.receive
 
@@ -67,6 +76,7 @@ class LineWatch:
         if len(data) < 8 or data[:2] != b"\xff\xff":
             return
         instruction, address = data[4], data[5]
+        time -= len(data) * _BYTE
         if instruction in (_WRITE, _REG_WRITE):
             end, values = address + len(data) - 7, data[6:-1]
         elif instruction == _SYNC_WRITE:
@@ -75,6 +85,11 @@ class LineWatch:
             return
         if address <= _GOAL + 1 and end > _GOAL:
             self.goals.append(time)
+            if instruction == _SYNC_WRITE:
+                width = data[6] + 1
+                each = (data[at : at + width] for at in range(7, len(data) - 1, width))
+                at = 1 + _GOAL - address
+                self.counts.append((time, {part[0]: part[at] | part[at + 1] << 8 for part in each}))
         if address <= _ENABLE < end and values[_ENABLE - address]:
             self.enables.append(time)
 
@@ -115,7 +130,8 @@ class Plan:
     Attributes:
         faults: entries of a fault plan.
         end: s, when the run ends.
-        actions: what is done to the robot, and when (s).
+        actions: what is done to the robot, and when (s), between two ticks of the loop.
+        cuts_in: what is done at the very instant (s), in the middle of whatever is going on.
         command: wanted motion at a time (s).
         spoil: what becomes of the controller's output.
         rests: the run ends sitting and switched off.
@@ -126,6 +142,7 @@ class Plan:
     faults: Iterable[dict[str, Any]] = ()
     end: float = 5.0
     actions: dict[float, Action] = field(default_factory=dict)
+    cuts_in: dict[float, Action] = field(default_factory=dict)
     command: Callable[[float], MotionCommand] | None = None
     spoil: Callable[[float, ControlOutput], ControlOutput] | None = None
     rests: bool = False
@@ -162,6 +179,7 @@ class Rig:
         self.reasons: list[str] = []
         self.ended = math.inf
         self._ahead = sorted(plan.actions.items(), key=lambda item: item[0])
+        self._cut_in(sorted(plan.cuts_in.items(), key=lambda item: item[0]))
 
     # -- the run ----------------------------------------------------------------
 
@@ -197,6 +215,19 @@ class Rig:
             motion = self.plan.command(frame.time)
         output = self.pipeline.step(frame, motion, safety)
         return output if self.plan.spoil is None else self.plan.spoil(frame.time, output)
+
+    def _cut_in(self, ahead: list[tuple[float, Action]]) -> None:
+        clock: VirtualClock = self.on.robot._clock  # type: ignore[attr-defined]
+        sleep_until = clock.sleep_until
+
+        def watched(when: float) -> None:
+            while ahead and ahead[0][0] <= when:
+                sleep_until(ahead[0][0])
+                ahead.pop(0)[1](self)
+            sleep_until(when)
+
+        if ahead:
+            clock.sleep_until = watched  # type: ignore[method-assign]
 
     def _source(self, _: float) -> MotionCommand | None:
         if self.now >= self.plan.end:
@@ -240,7 +271,7 @@ class Rig:
 
     @property
     def fell(self) -> bool:
-        """Whether it fell as a summary defines it: a link above the feet touched the ground, or 45 degrees."""
+        """Whether it fell as a summary defines it: a link above the feet touched the ground, or 45°."""
         stood = self.first(Mode.WALK)
         touched = any(sample.touching for sample in self.data.truth if stood < sample.time < self.plan.end)
         return touched or self.tilt_deg() > 45.0

@@ -23,6 +23,8 @@ AT = 3.5
 """s, when most faults come: in the middle of a trot's step."""
 ENDS = 5.0
 """s, when those end that come and go at random."""
+OFF_TIME = 0.1
+"""s from an emergency to the last joint's torque."""
 TICK = math.radians(300.0) / 1023.0
 """rad, of a servo's position."""
 Spoil = Callable[[float, ControlOutput], ControlOutput]
@@ -126,7 +128,9 @@ def _told(entry: Mapping[str, Any]) -> str:
 # -- commands of a controller that has gone wrong ---------------------------------------------------------
 
 
-def _goals(change: Callable[[np.ndarray], np.ndarray], start: float, end: float) -> Spoil:
+def spoil_goals(change: Callable[[np.ndarray], np.ndarray], start: float, end: float) -> Spoil:
+    """Change the controller's goals, (16,) rad, from `start` to `end` (s)."""
+
     def spoil(time: float, output: ControlOutput) -> ControlOutput:
         if not start <= time < end:
             return output
@@ -332,21 +336,21 @@ CASES: dict[str, tuple[Case, ...]] = {
     "The controller": (
         Case(
             name="controller emits NaN", how="goal of one joint NaN in one tick", reaction=STOPS,
-            spoil=_goals(_not_finite, *_ONE_TICK), within=0.05, says=("command is not finite for FR_knee",),
+            spoil=spoil_goals(_not_finite, *_ONE_TICK), within=0.05, says=("command is not finite for FR_knee",),
             end=9.0,
         ),
         Case(
             name="controller emits nothing but NaN", how="goal of one joint NaN from then on", reaction=STOPS,
-            spoil=_goals(_not_finite, AT, math.inf), within=0.05,
+            spoil=spoil_goals(_not_finite, AT, math.inf), within=0.05,
             says=("command is not finite for FR_knee",), end=9.0,
         ),
         Case(
             name="500-tick step", how="all goals 500 counts away in one tick", reaction=WALKS,
-            spoil=_goals(_stepped, *_ONE_TICK), says=("jumped by 2.5", "moves there slowly"),
+            spoil=spoil_goals(_stepped, *_ONE_TICK), says=("jumped by 2.5", "moves there slowly"),
         ),
         Case(
             name="out-of-limit goals", how="goals of the hip pitches 3 rad in one tick", reaction=WALKS,
-            spoil=_goals(_outside, *_ONE_TICK), says=("Check the controller",),
+            spoil=spoil_goals(_outside, *_ONE_TICK), says=("Check the controller",),
         ),
     ),
     "Sensors": (

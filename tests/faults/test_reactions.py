@@ -8,13 +8,11 @@ import pytest
 from bluefoot_mpc.io.safety.states import SafetyState
 from bluefoot_mpc.types import Mode
 from tests.faults.rig import SLOWEST, SPEED, Plan, Rig
-from tests.faults.table import AT, CASES, Case, Reaction
+from tests.faults.table import AT, CASES, OFF_TIME, Case, Reaction
 
 ALL = [pytest.param(case, id=case.name.replace(" ", "-")) for cases in CASES.values() for case in cases]
 STILL_WALKS = 0.75 * SPEED
 """m/s that a disturbed robot must make at least."""
-OFF_TIME = 0.1
-"""s from an emergency to the last joint's torque."""
 GAIT_END = 1.3
 """s that a trot takes to end before the robot sits down."""
 FASTEST_SINKING = 0.3
