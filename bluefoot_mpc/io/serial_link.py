@@ -58,6 +58,7 @@ class SerialLink:
         name: the port as given.
         baud: bit/s.
         is_paced: True where bytes take their time; a pseudo-terminal may be faster than its baud rate.
+        openings: how often it has been opened.
     """
 
     def __init__(self, port: str, baud: int, clock: Clock) -> None:
@@ -66,9 +67,15 @@ class SerialLink:
         self.is_paced = not _is_pseudo(port)
         self._clock = clock
         self._wants_low_latency = False
+        self.openings = 0
         self._serial: serial.Serial | None = None
         self._fd = -1
         self._open()
+
+    @property
+    def is_open(self) -> bool:
+        """False while the port is lost, or given back."""
+        return self._fd >= 0
 
     def fileno(self) -> int:
         """The descriptor to wait on, for several ports at once.
@@ -159,6 +166,9 @@ class SerialLink:
         # A port that is gone may refuse whatever is asked of it.
         with contextlib.suppress(OSError, termios.error, serial.SerialException):
             fcntl.ioctl(port.fd, termios.TIOCNXCL)
+        # A watchdog process shares the descriptor, and with it the lock that `exclusive` takes.
+        with contextlib.suppress(OSError, serial.SerialException):
+            fcntl.flock(port.fd, fcntl.LOCK_UN)
         with contextlib.suppress(OSError, termios.error, serial.SerialException):
             port.close()
 
@@ -216,6 +226,7 @@ class SerialLink:
         except (serial.SerialException, OSError, ValueError, OverflowError, termios.error) as error:
             raise LinkError(self._why_not(error)) from error
         self._fd = int(self._serial.fd)
+        self.openings += 1
         if not _is_pseudo(self.name):
             # Keeps out programs that take no lock. A pseudo-terminal would stay shut after a crash.
             with contextlib.suppress(OSError):

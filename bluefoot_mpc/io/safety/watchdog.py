@@ -36,7 +36,7 @@ log = logging.getLogger("bluefoot.watchdog")
 HEARTBEAT = b"h"
 FAREWELL = b"e"
 PORT = b"p"
-"""Followed by the number of the port as one byte; its new descriptor comes with it."""
+"""Followed by the number of the port as one byte; its new descriptor comes with it, none where it is lost."""
 READY = b"r"
 FIRED = b"f"
 
@@ -66,6 +66,12 @@ class GuardedPort:
     payload: bytes
     descriptor: int = -1
 
+    def take(self, descriptor: int) -> None:
+        """Use another descriptor, -1 for none; an old one would keep a lost device's name in use."""
+        if self.descriptor >= 0:
+            os.close(self.descriptor)
+        self.descriptor = descriptor
+
     def write(self) -> bool:
         """Write the bytes once; True when the port has taken them."""
         if self.descriptor >= 0 and _written(self.descriptor, self.payload):
@@ -73,9 +79,7 @@ class GuardedPort:
         opened = _opened(self.path, self.baud)
         if opened < 0:
             return False
-        if self.descriptor >= 0:
-            os.close(self.descriptor)
-        self.descriptor = opened
+        self.take(opened)
         return _written(opened, self.payload)
 
 
@@ -153,8 +157,8 @@ class Watch:
                 self._fire("the robot's program ended without a farewell")
                 return HAS_FIRED
             self._heard = self._heard or message.startswith(HEARTBEAT)
-            if message.startswith(PORT) and len(message) == 2 and descriptors:
-                self._ports[message[1]].descriptor = descriptors[0]
+            if message.startswith(PORT) and len(message) == 2:
+                self._ports[message[1]].take(descriptors[0] if descriptors else -1)
             if self._fired:
                 self._insist()
 

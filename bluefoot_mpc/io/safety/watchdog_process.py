@@ -92,11 +92,20 @@ class WatchdogProcess:
                 self._lost = self._exchange(watchdog.HEARTBEAT if beats else b"", ())
             return self._lost != _FIRED
 
-    def replace(self, index: int, descriptor: int) -> None:
-        """Hand over the descriptor of a port that was opened anew; `index` as in the ports at the start."""
+    def replace(self, index: int, descriptor: int | None) -> None:
+        """Hand over the descriptor of a port that was opened anew, None of one that is lost.
+
+        An adapter that is plugged in again gets its old name only when nobody holds the
+        old one's descriptor any more.
+
+        Args:
+            index: of the port, as in the ports at the start.
+            descriptor: open here.
+        """
+        handed = () if descriptor is None else (descriptor,)
         with self._lock:
             if not self._lost and not self._closed:
-                self._lost = self._exchange(watchdog.PORT + bytes((index,)), (descriptor,))
+                self._lost = self._exchange(watchdog.PORT + bytes((index,)), handed)
 
     def close(self) -> None:
         """Dismiss it: torque is off already. Idempotent, never raises."""

@@ -287,11 +287,6 @@ class DeviceCycle:
         """True while goals are refused."""
         return any(bus.latch.closed for bus in self._devices.buses)
 
-    @property
-    def lost_ports(self) -> tuple[str, ...]:
-        """Names of servo ports that are gone, as of the last period."""
-        return () if self._joints is None else self._joints.lost_ports
-
     def _beat(self) -> None:
         if self._devices.board is not None:
             self._devices.board.beat()

@@ -265,7 +265,7 @@ class LiveRobot:
         """Tell the watchdog process that all is well, and hear whether it thinks so."""
         if self._watchdog is None or not self._is_watched:
             return
-        if not self._watchdog.beat(self._cycle.lost_ports):
+        if not self._watchdog.beat():
             self._guard.emergency("the watchdog process has switched the torque off")
 
     def _check(self) -> tuple[Finding, ...]:

@@ -26,8 +26,8 @@ class PortWatchdog:
     """
 
     def __init__(self, servos: Sequence[SerialLink], board: SerialLink) -> None:
-        self._servos = tuple(servos)
-        self._were_lost: tuple[str, ...] = ()
+        self._links = (*servos, board)
+        self._held = [link.openings for link in self._links]
         guarded = [_guarded(link, TORQUE_OFF) for link in servos]
         self._process = WatchdogProcess([*guarded, _guarded(board, _CUT)])
 
@@ -41,16 +41,13 @@ class PortWatchdog:
         """Its process number."""
         return self._process.pid
 
-    def beat(self, lost_ports: tuple[str, ...]) -> bool:
-        """Tell it that all is well, and hand over ports that came back; False where torque must go now.
-
-        Args:
-            lost_ports: names of the servo ports that are gone now.
-        """
-        for index, link in enumerate(self._servos):
-            if link.name in self._were_lost and link.name not in lost_ports:
+    def beat(self) -> bool:
+        """Tell it that all is well, and which ports were lost or came back; False where torque must go now."""
+        for index, link in enumerate(self._links):
+            held = link.openings if link.is_open else 0
+            if held != self._held[index]:
+                self._held[index] = held
                 self._hand_over(index, link)
-        self._were_lost = lost_ports
         return self._process.beat()
 
     def close(self) -> None:
@@ -61,7 +58,7 @@ class PortWatchdog:
         try:
             self._process.replace(index, link.fileno())
         except LinkLostError:
-            return  # gone again: handed over when it is back
+            self._process.replace(index, None)
 
 
 def _guarded(link: SerialLink, payload: bytes) -> GuardedPort:
