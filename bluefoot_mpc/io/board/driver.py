@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable
 
 import numpy as np
 
@@ -148,17 +149,26 @@ class SensorBoard:
         # A board that is not heard may still hear.
         self._send(orders, even_if_lost=True)
 
-    def wait_power(self, on: bool, timeout: float = 1.0) -> bool:
+    @property
+    def is_cut(self) -> bool:
+        """True from a cut until power is asked for again."""
+        return self._power.is_cut
+
+    def wait_power(
+        self, on: bool, timeout: float = 1.0, meanwhile: Callable[[], object] = lambda: None
+    ) -> bool:
         """Poll and beat until the power is as asked for; False where it is not in time or was refused.
 
         Args:
             on: what was asked for with `power`.
             timeout: s.
+            meanwhile: called every 5 ms.
         """
         end = self._clock.now() + timeout
         while self._clock.now() < end:
             self.poll()
             self.beat()
+            meanwhile()
             if self._power.power_on == on or (on and self._power.refused):
                 break
             self._clock.sleep_until(self._clock.now() + 0.005)

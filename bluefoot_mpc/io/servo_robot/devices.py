@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,7 @@ from bluefoot_mpc.io.dynamixel.bus import ServoBus
 from bluefoot_mpc.io.dynamixel.cycle import BusCycle, Readings
 from bluefoot_mpc.io.dynamixel.errors import ServoError
 from bluefoot_mpc.io.dynamixel.layout import ServoLayout
-from bluefoot_mpc.io.findings import Finding, Severity
+from bluefoot_mpc.io.findings import Finding, NotArmedError, Severity
 from bluefoot_mpc.io.lidar.driver import Lidar
 from bluefoot_mpc.io.lidar.errors import LidarError
 from bluefoot_mpc.io.safety.health import Health
@@ -44,6 +45,12 @@ _STILL_ON = Finding(
     part="power board",
     text="the servos' supply is still on after the board was told to cut it",
     mend="Unplug the servos' battery",
+    severity=Severity.REFUSAL,
+)
+_STOPPED = Finding(
+    part="arming",
+    text="somebody stopped the robot meanwhile",
+    mend="Arm anew",
     severity=Severity.REFUSAL,
 )
 _NOW = 0.0
@@ -90,10 +97,20 @@ class DeviceCycle:
         devices: the drivers.
         clock: the clock that their links were made with.
         config: timing.
+        alive: called at least every quarter of a second, also while the servos are checked and armed.
     """
 
-    def __init__(self, devices: Devices, clock: Clock, config: DevicesConfig) -> None:
+    def __init__(
+        self,
+        devices: Devices,
+        clock: Clock,
+        config: DevicesConfig,
+        alive: Callable[[], object] = lambda: None,
+    ) -> None:
         self._devices, self._clock, self._config = devices, clock, config
+        self._alive = alive
+        self._stops = 0
+        self._checked_at: int | None = None
         self._reading_times: deque[float] = deque(maxlen=_LATELY)
         self._due = clock.now()
         self._board: BoardReadings | None = None
@@ -122,11 +139,17 @@ class DeviceCycle:
     def _supply(self) -> None:
         """Have the servos' supply on, and give them time to start."""
         board, clock = self._devices.board, self._clock
-        if board is not None:
-            board.power(True)
-            board.wait_power(True, self._config.connect_time)
-            clock.sleep_until(clock.now() + _BOOT)
-            board.beat()
+        if board is None:
+            return
+        if board.is_cut:
+            # What was cut a moment ago may not have gone off yet.
+            board.wait_power(False, _CUT_TIME, self._alive)
+        board.power(True)
+        board.wait_power(True, self._config.connect_time, self._alive)
+        end = clock.now() + _BOOT
+        while clock.now() < end:
+            clock.sleep_until(min(end, clock.now() + _BOOT / 2))
+            self._beat()
 
     def restart(self) -> None:
         """Begin a new period now."""
@@ -137,7 +160,9 @@ class DeviceCycle:
 
         A robot that was stopped gets its servos' supply back for it.
         """
-        if self._devices.board is not None and not self._devices.board.wait_power(True, _NOW):
+        self._checked_at = self._stops
+        board = self._devices.board
+        if board is not None and (board.is_cut or not board.wait_power(True, _NOW)):
             self._supply()
             self.restart()
             self.collect()
@@ -168,18 +193,29 @@ class DeviceCycle:
         """Hold the present position with a low torque limit.
 
         Raises:
-            NotArmedError: a servo refused; every torque is off again.
+            NotArmedError: a servo refused, or somebody stopped the robot since it was checked; every
+                torque is off again, and the supply cut.
         """
-        for bus in self._devices.buses:
+        devices = self._devices
+        checked_at, self._checked_at = self._checked_at, None
+        for bus in devices.buses:
             bus.latch.release()
         try:
-            arming.arm(self._devices.buses, self._devices.layout, torque_limit)
+            # After the release: a stop that comes later closes the latch again.
+            if checked_at not in (None, self._stops):
+                raise NotArmedError([_STOPPED])
+            for leg in range(N_LEGS):
+                arming.arm(devices.buses, devices.layout, torque_limit, range(4 * leg, 4 * leg + 4))
+                # Sixteen servos can take longer than board and watchdog wait.
+                self._beat()
+            devices.cycle.admit()
+            self.may_move = True
+            if self.is_latched:
+                raise NotArmedError([_STOPPED])
         except BaseException:
-            self.latch("not armed")
+            # Whatever it was: torque off may not have reached every servo.
+            self.cut("not armed")
             raise
-        self._devices.cycle.admit()
-        self.may_move = True
-        self._beat()
         self.restart()
 
     def cut(self, reason: str) -> tuple[Finding, ...]:
@@ -206,6 +242,7 @@ class DeviceCycle:
 
     def latch(self, reason: str) -> None:
         """Refuse every write that could move a servo, from any thread, until armed."""
+        self._stops += 1
         for bus in self._devices.buses:
             bus.latch.close(reason)
 
@@ -265,7 +302,7 @@ class DeviceCycle:
         """As `collect`, until every servo has answered in one period, some periods at most."""
         frame = self.collect()
         for _ in range(_TRIES):
-            if frame.joint_valid.all():
+            if frame.joint_valid.all() or self.is_latched:
                 break
             frame = self.collect()
         return frame
@@ -288,6 +325,7 @@ class DeviceCycle:
         return any(bus.latch.closed for bus in self._devices.buses)
 
     def _beat(self) -> None:
+        self._alive()
         if self._devices.board is not None:
             self._devices.board.beat()
 

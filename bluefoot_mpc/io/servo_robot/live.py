@@ -58,7 +58,7 @@ class LiveRobot:
     ) -> None:
         self.period = config.period
         self._clock, self._config = clock, config
-        self._cycle = DeviceCycle(devices, clock, config)
+        self._cycle = DeviceCycle(devices, clock, config, self._watch)
         self._guard = Guard()
         self._watchdog = watchdog
         self._on_close = on_close
@@ -67,7 +67,7 @@ class LiveRobot:
         self._setpoint: JointCommand | None = None
         self._given_at = clock.now()
         self._is_new = False
-        self._is_armed = self._is_watched = False
+        self._is_armed = self._is_watched = self._has_torque = False
         self._frame: SensorFrame | None = None
         self._count = self._taken = 0
         self._ending = self._is_closed = False
@@ -146,9 +146,9 @@ class LiveRobot:
         # Here and now, whatever the bus thread is doing; it sends the rest.
         self._cycle.latch("stopped")
         self._guard.emergency("stopped")
-        if not self._is_armed:
-            return
         self._cycle.cut_power()
+        if not self._has_torque:
+            return
         with self._changed:
             self._changed.notify_all()
         thread = self._thread
@@ -177,7 +177,6 @@ class LiveRobot:
 
     def _on_bus(self, job: Callable[[], T]) -> T:
         """Have the bus thread do something, wait for it, and give what it gives or raises."""
-        done = threading.Event()
         result: list[T] = []
         raised: list[BaseException] = []
 
@@ -186,22 +185,28 @@ class LiveRobot:
                 result.append(job())
             except BaseException as error:  # It belongs to the thread that asked.
                 raised.append(error)
-            done.set()
+            with self._changed:
+                self._changed.notify_all()
 
         with self._changed:
             self._jobs.append(work)
             self._changed.notify_all()
-        finished = done.wait(_JOB_TIME)
+            self._changed.wait_for(
+                lambda: bool(result or raised) or self._failure is not None or self._ending, _JOB_TIME
+            )
+            if work in self._jobs:
+                # Nobody waits for it any more.
+                self._jobs.remove(work)
         if raised:
             raise raised[0]
-        self._require_alive(finished)
+        self._require_alive(bool(result), _JOB_TIME)
         return result[0]
 
-    def _require_alive(self, arrived: bool) -> None:
+    def _require_alive(self, arrived: bool, patience: float = _PATIENCE) -> None:
         if self._failure is not None:
             raise DeviceError(f"the bus thread has ended: {self._failure}") from self._failure
         if not arrived:
-            raise DeviceError(f"no frame from the bus within {_PATIENCE:g} s: adapter or machine hang")
+            raise DeviceError(f"nothing from the bus thread within {patience:g} s: adapter or machine hang")
 
     def _newest(self) -> SensorFrame:
         if self._frame is None:
@@ -257,6 +262,7 @@ class LiveRobot:
     def _switch_off(self, reason: str, *, verified: bool) -> None:
         self._is_armed = False
         findings = self._cycle.off(reason) if verified else self._cycle.cut(reason)
+        self._has_torque = False
         self._is_off.set()
         for finding in findings:
             log.warning("%s", finding)
@@ -283,9 +289,14 @@ class LiveRobot:
         self._guard.reset()
         self._is_off.clear()
         # From the first beat on it expects the next: what came before could take its time.
-        self._is_watched = True
+        self._is_watched = self._has_torque = True
         self._watch()
-        self._cycle.arm(torque_limit)
+        try:
+            self._cycle.arm(torque_limit)
+        except BaseException:
+            self._has_torque = False
+            self._is_off.set()
+            raise
         self._setpoint, self._given_at = None, self._clock.now()
         self._is_armed = True
         return self._cycle.collect_all()

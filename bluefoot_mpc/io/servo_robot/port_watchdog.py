@@ -42,7 +42,7 @@ class PortWatchdog:
         return self._process.pid
 
     def beat(self) -> bool:
-        """Tell it that all is well, and which ports were lost or came back; False where torque must go now."""
+        """Tell it that all is well, and which ports went or came back; False where torque must go now."""
         for index, link in enumerate(self._links):
             held = link.openings if link.is_open else 0
             if held != self._held[index]:

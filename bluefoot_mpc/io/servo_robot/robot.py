@@ -89,6 +89,8 @@ class ServoRobot:
         self._guard.emergency("stopped")
         if self._cycle.may_move:
             _tell(self._cycle.cut("stopped"))
+        else:
+            self._cycle.cut_power()
 
     def close(self) -> None:
         """Switch off what is still on, and give back the ports. Idempotent."""
