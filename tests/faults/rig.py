@@ -10,7 +10,7 @@ Times are seconds on that clock; the robot is armed at about 1.4 s and trots fro
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -129,6 +129,7 @@ class Plan:
 
     Attributes:
         faults: entries of a fault plan.
+        seed: of what is drawn in it.
         end: s, when the run ends.
         actions: what is done to the robot, and when (s), between two ticks of the loop.
         cuts_in: what is done at the very instant (s), in the middle of whatever is going on.
@@ -139,7 +140,8 @@ class Plan:
         after: what is done after the loop's end, before the ports are given back.
     """
 
-    faults: Iterable[dict[str, Any]] = ()
+    faults: Iterable[Mapping[str, Any]] = ()
+    seed: int = 0
     end: float = 5.0
     actions: dict[float, Action] = field(default_factory=dict)
     cuts_in: dict[float, Action] = field(default_factory=dict)
@@ -302,7 +304,9 @@ def _resolved(plan: Plan, folder: Path) -> Resolved:
     entries = list(plan.faults)
     if entries:
         path = folder / "faults.toml"
-        path.write_text("".join(f"[[fault]]\n{_toml(entry)}\n" for entry in entries))
+        path.write_text(
+            f"seed = {plan.seed}\n" + "".join(f"[[fault]]\n{_toml(entry)}\n" for entry in entries)
+        )
         overrides.append(f"devices.faults={path}")
     if plan.lidar:
         overrides.append("devices.emulate_lidar=true")
@@ -310,6 +314,6 @@ def _resolved(plan: Plan, folder: Path) -> Resolved:
     return resolve(find_scenario("walk"), options)
 
 
-def _toml(entry: dict[str, Any]) -> str:
+def _toml(entry: Mapping[str, Any]) -> str:
     return "\n".join(f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value}"
                      for key, value in entry.items())  # fmt: skip

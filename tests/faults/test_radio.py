@@ -1,4 +1,4 @@
-"""A robot that trots by radio while the radio goes wrong: MAVLink byte by byte, the watchdog over commands."""
+"""A robot that trots by radio while the radio goes wrong: MAVLink byte by byte."""
 
 from types import SimpleNamespace
 
@@ -27,24 +27,27 @@ class Radio:
         hands_off: s from which only heartbeats are sent.
         replay: s from which signed frames of the second before are sent again and again.
         corrupt: share of the bytes that are changed.
+        jump: s by which the robot's wall clock is set, at `AT`.
     """
 
-    def __init__(self, silent=np.inf, hands_off=np.inf, replay=np.inf, corrupt=0.0):
+    def __init__(self, silent=np.inf, hands_off=np.inf, replay=np.inf, corrupt=0.0, jump=0.0):
         self.silent, self.hands_off, self.replay, self.corrupt = silent, hands_off, replay, corrupt
         self.peer, self.random = signing_peer(), np.random.default_rng(1)
-        self.end = RobotEnd(StationConfig(), 0.0, Signer(KEY, lambda: WALL))
+        self.now = 0.0
+        wall = lambda: WALL + self.now + jump * (self.now >= AT)  # noqa: E731
+        self.end = RobotEnd(StationConfig(), 0.0, Signer(KEY, wall))
         self.source = None
         self.beat_at = self.stick_at = 0.0
         self.recorded, self.asked = [], False
 
     def __call__(self, time):
+        self.now = time
         for data in self._sent(time):
             self.end.receive(self._damaged(data), time)
         if self.source is None:
             clock = SimpleNamespace(now=lambda: self.now)
             link = SimpleNamespace(command=self.end.inbox.command, say=lambda text, *, fault: None)
             self.source = LinkSource(link, clock=clock)
-        self.now = time
         return self.source(time)
 
     def _sent(self, time):
@@ -87,8 +90,9 @@ def check_line(rig):
     assert rig.parts.report()["protocol_violations"] == {}
 
 
-def test_a_working_radio(tmp_path):
-    rig = drive(Radio(), tmp_path, 5.5)
+@pytest.mark.parametrize("jump", [0.0, 3600.0, -3600.0])
+def test_a_wall_clock_that_jumps_changes_nothing(jump, tmp_path):
+    rig = drive(Radio(jump=jump), tmp_path, 5.5)
     assert set(rig.modes(AT, 5.5)) == {Mode.WALK}
     assert rig.way(AT, 5.5) > 0.7 * SPEED * 2.0
     check_unhurt(rig)

@@ -57,6 +57,20 @@ def check_walks_on(rig: Rig, case: Case) -> None:
     assert not rig.fell
     assert rig.tilt_deg(case.since) < 4.0
     assert rig.way(case.since, case.end) > STILL_WALKS * (case.end - case.since)
+    if case.lidar and case.since == AT:
+        check_scans(rig, case)
+
+
+def check_scans(rig: Rig, case: Case) -> None:
+    """Scans come back, and none of them is a damaged one."""
+    scans = [(frame.time, frame.lidar) for frame in rig.data.frames if frame.lidar is not None]
+    times = np.array([time for time, _ in scans])
+    assert times[-1] > case.end - 0.2
+    assert len(times[times < 3.0]) > 10
+    assert np.diff(times).max() > 0.15  # the fault has cost some
+    first = np.nan_to_num(scans[0][1].distance)
+    for _, scan in scans:
+        assert np.median(np.abs(np.nan_to_num(scan.distance) - first)) < 0.2
 
 
 def check_pauses(rig: Rig, case: Case) -> None:
