@@ -1,7 +1,7 @@
 """The cycle of all servos: one sync write, sixteen positions, one full reading in turn; fifty times a second.
 
 Lost replies are values, not exceptions: a reading has a time and says whether
-it is fresh. A servo that stays silent is left out and asked once a second, so
+it is fresh. A servo that stays silent is left out and asked five times a second, so
 that it does not slow the others. One that was gone is looked at before it gets
 another goal, for a goal switches torque on: when it has lost its RAM, goals are
 withheld until it is armed again.
@@ -44,13 +44,14 @@ class Readings:
         counts: (16,) position counts; NaN where there never was one.
         times: (16,) s, when each servo measured its position.
         fresh: (16,) True where that was in this cycle.
+        put_off: (16,) True where this cycle had no time to ask; those servos are asked first in the next.
         speed: (16,) rad/s, counter-clockwise positive.
         load: (16,) fraction of full duty, counter-clockwise positive.
         voltage: (16,) V.
         temperature: (16,) °C.
         full_times: (16,) s, when each servo measured speed, load, voltage and temperature.
         errors: (16,) error bits (`ErrorBit`) of each servo's newest reply.
-        suspects: (16,) True where a servo is left out and asked once a second.
+        suspects: (16,) True where a servo is left out and asked five times a second.
         returned: (16,) True where a servo lost its RAM: it is limp, and gets no goal until it is armed.
         shut: (16,) True where a servo reported overheating or overload since it was armed.
         lost_ports: names of ports that are gone.
@@ -59,6 +60,7 @@ class Readings:
     counts: FloatArray
     times: FloatArray
     fresh: BoolArray
+    put_off: BoolArray
     speed: FloatArray
     load: FloatArray
     voltage: FloatArray
@@ -202,6 +204,7 @@ class BusCycle:
             counts=np.array([servo.counts for servo in servos], dtype=float),
             times=np.array([servo.time for servo in servos], dtype=float),
             fresh=np.array([servo.fresh for servo in servos]),
+            put_off=np.array([servo.put_off for servo in servos]),
             speed=np.array([servo.speed for servo in servos], dtype=float),
             load=np.array([servo.load for servo in servos], dtype=float),
             voltage=np.array([servo.voltage for servo in servos], dtype=float),

@@ -30,7 +30,7 @@ class CycleConfig:
     """How the cycle deals with servos that do not answer."""
 
     misses: int = 5  # cycles in a row without a reply after which a servo is left out
-    probe_period: float = 1.0  # s between questions to one that is left out
+    probe_period: float = 0.2  # s between questions to one that is left out; 0.5 s of silence is a fault
     reopen_period: float = 0.1  # s between attempts to open a lost port again
     limit_repeats: int = 2  # how often a new torque limit is sent once more: nobody acknowledges it
 
@@ -143,7 +143,7 @@ class PortCycle:
         now = self._clock.now()
         servos = self.servos
         for servo in servos:
-            servo.fresh = False
+            servo.fresh = servo.put_off = False
         self._jobs.clear()
         self._at = 0
         if self.is_lost and not self._reopen(now):
@@ -201,6 +201,7 @@ class PortCycle:
 
     def _put_off(self, servo: ServoState, kind: Kind) -> None:
         """Ask it first in the next cycle."""
+        servo.put_off = servo.put_off or kind is not Kind.FULL
         self._cut_off.setdefault((servo.id, kind is Kind.FULL), len(self._cut_off))
 
     def finish(self, outcome: Outcome, deadline: float) -> None:

@@ -49,6 +49,7 @@ class ServoState:
         counts: newest position, counts as measured; NaN before the first.
         time: s, when the servo measured it.
         fresh: True where it was measured in this cycle.
+        put_off: True where this cycle had no time to ask for it; it is asked first in the next one.
         speed, load, voltage, temperature, full_time: of the newest full read; rad/s, fraction, V, °C, s.
         error: error bits of the newest reply.
         admitted: goals may go out to it: it was armed.
@@ -77,6 +78,7 @@ class ServoState:
         "misses",
         "part",
         "probe_at",
+        "put_off",
         "requests",
         "returned",
         "shut",
@@ -96,6 +98,7 @@ class ServoState:
         self.voltage = self.temperature = self.full_time = math.nan
         self.error = self.misses = self.limit_repeats = 0
         self.fresh = self.admitted = self.doubtful = self.suspect = self.returned = self.shut = False
+        self.put_off = False
         self.probe_at = 0.0
         self.limit: int | None = None
 
