@@ -20,6 +20,8 @@ from bluefoot_mpc.types import FloatArray, PostureReference, SensorFrame
 
 START_TIME = 1.0
 """s over which the joints go from where they were found to where they are wanted."""
+_RECENT = 0.1
+"""s for which a joint that did not answer is taken to be where it was."""
 
 
 class JointTargets:
@@ -78,8 +80,10 @@ class JointTargets:
         else:
             self._beyond = frozenset()
         if self._found is None:
-            # A servo that did not answer is taken to be where it is wanted.
-            known = frame.joint_valid & np.isfinite(frame.joint_position)
+            # A servo that did not answer in this period is where it was a moment ago; one that is not known
+            # is taken to be where it is wanted.
+            recent = frame.joint_valid | (frame.time - frame.joint_time <= _RECENT)
+            known = recent & np.isfinite(frame.joint_position)
             self._found = np.where(known, frame.joint_position, goal)
         return self._soften(goal, self._found, dt), events
 

@@ -14,7 +14,7 @@ from bluefoot_mpc.leveling import compensator
 from bluefoot_mpc.leveling.config import LevelingConfig
 from bluefoot_mpc.types import Mode
 from tests.control.closed_loop import mode, walk
-from tests.io.test_safety import make_frame
+from tests.io.safety.scripted import make_frame
 from tests.leveling.bench import DT, NOW, ROBOT, STANCE, SWINGING, Told, state
 
 WISH = LevelWish(tilt=np.zeros(2), heading=0.2, walking=True, voltage=12.0)

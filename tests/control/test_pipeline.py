@@ -13,7 +13,7 @@ from bluefoot_mpc.model.robot import load_robot
 from bluefoot_mpc.types import BodyState, Mode, SafetyLevel, SafetyRequest
 from bluefoot_mpc.zmp.placement import PlacementConfig
 from tests.control.closed_loop import mode, walk
-from tests.io.test_safety import make_frame
+from tests.io.safety.scripted import make_frame
 
 DT = 0.02
 

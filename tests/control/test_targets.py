@@ -8,7 +8,7 @@ from bluefoot_mpc.geometry import rotation_from_rpy
 from bluefoot_mpc.model.legs import AnkleConfig, feet_in_base
 from bluefoot_mpc.model.robot import load_robot
 from bluefoot_mpc.types import PostureReference
-from tests.io.test_safety import make_frame
+from tests.io.safety.scripted import make_frame
 
 DT = 0.02
 
@@ -83,11 +83,15 @@ def test_only_the_first_frame_tells_where_the_joints_were_found(robot):
 def test_a_joint_that_did_not_answer_starts_where_it_is_wanted(robot):
     targets = JointTargets(robot.geometry, AnkleConfig())
     position, valid = robot.stance_joints + 0.2, np.ones(16, dtype=bool)
-    position[3], valid[7] = np.nan, False
-    goal, _ = targets.step(reference(robot), make_frame(joint_position=position, joint_valid=valid), DT)
+    position[3], valid[[7, 8]] = np.nan, False
+    # One has been silent for a while, the other was not asked in this period alone.
+    read = np.zeros(16)
+    read[7], read[8] = -1.0, -0.03
+    frame = make_frame(joint_position=position, joint_valid=valid, joint_time=read)
+    goal, _ = targets.step(reference(robot), frame, DT)
     wanted = targets.reach(reference(robot)).joints
     np.testing.assert_array_equal(goal[[3, 7]], wanted[[3, 7]])
-    assert np.abs(goal[0] - position[0]) < 0.01
+    assert np.abs(goal[[0, 8]] - position[[0, 8]]).max() < 0.01
 
 
 def test_limits_cut_the_goals_and_each_is_told_when_it_begins_to(robot):

@@ -4,7 +4,7 @@ import pytest
 
 from bluefoot_mpc.io.pacing import PacedRobot
 from bluefoot_mpc.io.robot import Robot
-from tests.io.test_safety import FakeRobot, goal
+from tests.io.safety.scripted import FakeRobot, goal
 
 
 class Clock:

@@ -17,6 +17,9 @@ JUMP = 0.5
 BEYOND = 0.1
 """rad that a goal may lie outside the limits before people are told; a limp joint may be found there."""
 
+RECENT = 0.1
+"""s for which a position counts as known: a slow adapter does not ask every servo in each period."""
+
 
 class CommandGate:
     """Turns commands into ones that may be sent.
@@ -43,8 +46,7 @@ class CommandGate:
 
     def locate(self, frame: SensorFrame) -> None:
         """Take where the joints are; what is not known stays."""
-        answered = frame.joint_valid & np.isfinite(frame.joint_position)
-        self.position = np.where(answered, frame.joint_position, self.position)
+        self.position = np.where(known(frame), frame.joint_position, self.position)
 
     def passed(self, command: JointCommand) -> JointCommand:
         """The command inside all limits; it must be finite."""
@@ -90,6 +92,12 @@ class CommandGate:
             return self.last.position
         # Of a servo that has not answered yet nothing is known: its first goal goes as it is.
         return np.where(np.isnan(self.position), command.position, self.position)
+
+
+def known(frame: SensorFrame) -> BoolArray:
+    """(16,) True where a joint's position is known: measured in this period, or a moment ago."""
+    measured: BoolArray = frame.joint_valid | (frame.time - frame.joint_time <= RECENT)
+    return measured & np.isfinite(frame.joint_position)
 
 
 def usable(command: JointCommand) -> bool:

@@ -21,6 +21,7 @@ class Health:
             defaults and its torque off. They stay listed until the robot is armed anew.
         silent: joints whose servo does not answer as it should: people are told, and the supervisor
             counts for itself when it has been too long.
+        put_off: joints whose servo this period had no time to ask, on a slow adapter: not lost, only older.
         guard: what the guard on the bus thread does; None without one.
         watched: False when the watchdog process is gone; None without one.
         findings: anything else that people should know; those that refuse make the robot sit down.
@@ -30,6 +31,7 @@ class Health:
     shut_down: tuple[int, ...] = ()
     restarted: tuple[int, ...] = ()
     silent: tuple[int, ...] = ()
+    put_off: tuple[int, ...] = ()
     guard: GuardState | None = None
     watched: bool | None = None
     findings: tuple[Finding, ...] = ()

@@ -62,7 +62,7 @@ class Monitors:
         dt = min(max(since, self._period), _LONGEST)
         faults = self._supply.step(frame, dt)
         faults += self._heat.step(frame, dt)
-        faults += self._replies.step(frame, dt)
+        faults += self._replies.step(frame, dt, () if health is None else health.put_off)
         faults += self._inertial.step(frame, dt)
         if self._powered:
             faults += self._frames.step(advanced, dt)

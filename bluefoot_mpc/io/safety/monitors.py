@@ -159,10 +159,20 @@ class ReplyMonitor:
         self._sum = 0
         self._silent = [0.0] * N_JOINTS
 
-    def step(self, frame: SensorFrame, dt: float) -> list[Fault]:
-        """Judge a frame that came `dt` (s) after the last one."""
+    def step(self, frame: SensorFrame, dt: float, put_off: tuple[int, ...] = ()) -> list[Fault]:
+        """Judge a frame that came `dt` (s) after the last one.
+
+        Args:
+            frame: what the sensors say.
+            dt: s.
+            put_off: joints that nobody asked in this period; lost only when their reading is too old.
+        """
         oldest = frame.time - self._config.reading_max_age - _SLACK
-        answered: list[bool] = (frame.joint_valid & (frame.joint_time >= oldest)).tolist()
+        valid = frame.joint_valid
+        if put_off:
+            valid = valid.copy()
+            valid[list(put_off)] = True
+        answered: list[bool] = (valid & (frame.joint_time >= oldest)).tolist()
         lost = answered.count(False)
         self._sum += lost - self._lost[0]
         self._lost.append(lost)

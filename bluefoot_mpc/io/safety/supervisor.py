@@ -10,15 +10,13 @@ from __future__ import annotations
 
 import logging
 
-import numpy as np
-
 from bluefoot_mpc.exceptions import DeviceError
 from bluefoot_mpc.io.findings import Finding, NotArmedError, Severity
 from bluefoot_mpc.io.robot import PoweredRobot, Robot
 from bluefoot_mpc.io.safety import sink, states
 from bluefoot_mpc.io.safety.config import SafetyConfig
 from bluefoot_mpc.io.safety.faults import Fault, FaultBook, Response
-from bluefoot_mpc.io.safety.gate import CommandGate, capped, unusable_joints, usable
+from bluefoot_mpc.io.safety.gate import CommandGate, capped, known, unusable_joints, usable
 from bluefoot_mpc.io.safety.guard import EMERGENCY
 from bluefoot_mpc.io.safety.health import Watched
 from bluefoot_mpc.io.safety.monitoring import Monitors
@@ -299,7 +297,7 @@ class SafetySupervisor:
             refusal = Finding(part="arming", text=why, mend="Arm anew", severity=Severity.REFUSAL)
             raise ArmingInterruptedError([refusal])
         reasons = self._book.request.reasons if self._machine.state is SafetyState.DISARMED else ()
-        if frame is not None and not (frame.joint_valid & np.isfinite(frame.joint_position)).all():
+        if frame is not None and not known(frame).all():
             reasons = ("the position of a servo is not known. Check the plugs",)
         if reasons:
             raise NotArmedError(

@@ -299,12 +299,14 @@ class DeviceCycle:
         )  # fmt: skip
 
     def collect_all(self) -> SensorFrame:
-        """As `collect`, until every servo has answered in one period, some periods at most."""
+        """As `collect`, until every servo has answered, some periods at most."""
         frame = self.collect()
+        heard = frame.joint_valid.copy()
         for _ in range(_TRIES):
-            if frame.joint_valid.all() or self.is_latched:
+            if heard.all() or self.is_latched:
                 break
             frame = self.collect()
+            heard |= frame.joint_valid
         return frame
 
     def health(self) -> Health:
@@ -317,6 +319,7 @@ class DeviceCycle:
             shut_down=_where(joints.shut),
             restarted=_where(joints.returned),
             silent=_where(joints.suspects),
+            put_off=_where(joints.put_off),
         )
 
     @property

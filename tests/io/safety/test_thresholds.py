@@ -184,6 +184,36 @@ def test_an_unknown_temperature_holds_then_sits(supervisor, fake):
 # -- replies ------------------------------------------------------------------------------------------------
 
 
+HALF = np.arange(16) < 8
+
+
+@pytest.mark.parametrize(("age", "level"), [(0.06, SafetyLevel.NONE), (0.12, SafetyLevel.SIT)])
+def test_servos_that_a_slow_adapter_left_no_time_for_are_not_lost_until_they_are_old(
+    supervisor, fake, age, level
+):
+    fake.account = Health(power_on=True, put_off=tuple(range(8)))
+    fake.changes = {"joint_valid": ~HALF, "joint_time": lambda time: np.where(HALF, time - age, time)}
+    play(supervisor, 1.0)
+    assert supervisor.request.level == level
+    fake.account = Health(power_on=True)
+    play(supervisor, 1.0)
+    assert supervisor.request.level == SafetyLevel.SIT
+
+
+@pytest.mark.parametrize(("age", "is_armed"), [(0.06, True), (0.12, False)])
+def test_a_position_that_was_read_a_moment_ago_is_enough_to_arm(fake, age, is_armed):
+    fake.account = Health(power_on=True, put_off=tuple(range(8)))
+    fake.changes = {"joint_valid": ~HALF, "joint_time": lambda time: np.where(HALF, time - age, time)}
+    made = supervise(fake)
+    if is_armed:
+        made.reset()
+        np.testing.assert_array_equal(fake.moved[0].position, np.full(16, 0.3))
+        assert fake.moved[0].torque_limit.all()
+    else:
+        with pytest.raises(NotArmedError, match="position of a servo is not known"):
+            made.reset()
+
+
 def losses(share, seed=0):
     generator = np.random.default_rng(seed)
     return lambda time: generator.random(16) >= share
