@@ -179,8 +179,8 @@ CASES: dict[str, tuple[Case, ...]] = {
         Case(name="range-error status", faults=now_and_then("range_error"), reaction=WALKS),
         Case(
             name="more than 20 % of readings lost",
-            faults=(fault("drop_reply", probability=0.6, start=AT),), reaction=SITS,
-            within=0.5, says=_LOST, end=7.0,
+            faults=tuple(fault("drop_reply", servo=i, start=AT, end=AT + 0.4) for i in (1, 3, 5, 9, 11, 13)),
+            reaction=PAUSES, within=0.35, says=_LOST, end=7.5,
         ),
     ),
     "The line, and what is sent": (
@@ -388,19 +388,19 @@ CASES: dict[str, tuple[Case, ...]] = {
         ),
         Case(
             name="foot switch stuck open", how="FL says open", reaction=WALKS,
-            actions={AT: board(stuck_switch={0: False})}, end=6.5,
+            actions={AT: board(stuck_switch={0: False})}, end=6.5, says=("foot switch FL: stuck open",),
         ),
         Case(
             name="foot switch stuck closed", how="FL says closed", reaction=WALKS,
-            actions={AT: board(stuck_switch={0: True})}, end=6.5,
+            actions={AT: board(stuck_switch={0: True})}, end=6.5, says=("foot switch FL: stuck closed",),
         ),
         Case(
             name="foot switch chattering", how="FL changes at every look", reaction=WALKS,
-            actions={AT: board(chattering={0})},
+            actions={AT: board(chattering={0})}, says=("foot switch FL: chatters",),
         ),
         Case(
             name="all foot switches chattering", how="all change at every look", reaction=WALKS,
-            actions={AT: board(chattering={0, 1, 2, 3})},
+            actions={AT: board(chattering={0, 1, 2, 3})}, says=("foot switch RR: chatters",),
         ),
         Case(
             name="LIDAR bad sum", faults=now_and_then("bad_checksum", 0.002, device="lidar"), lidar=True,

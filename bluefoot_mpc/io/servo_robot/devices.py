@@ -320,6 +320,7 @@ class DeviceCycle:
             restarted=_where(joints.returned),
             silent=_where(joints.suspects),
             put_off=_where(joints.put_off),
+            findings=() if board is None else _switch_findings(board),
         )
 
     @property
@@ -336,3 +337,12 @@ class DeviceCycle:
 def _where(joints: BoolArray) -> tuple[int, ...]:
     """Numbers of the joints that are marked."""
     return tuple(np.flatnonzero(joints).tolist())
+
+
+def _switch_findings(board: BoardReadings) -> tuple[Finding, ...]:
+    """Foot switches that cannot be trusted: the robot walks on without them, and people should know."""
+    faults = (fault.partition(": ") for fault in board.faults if fault.startswith("foot switch"))
+    mend = "Check the switch and its cable"
+    return tuple(
+        Finding(part=part, text=text, mend=mend, severity=Severity.WARNING) for part, _, text in faults
+    )
