@@ -8,13 +8,10 @@ its gait and sit down before it goes limp; a simulation simply ends.
 from __future__ import annotations
 
 import logging
-import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from types import FrameType
 from typing import Any, Protocol
 
 import numpy as np
@@ -23,6 +20,7 @@ from bluefoot_mpc.control.pipeline import ControlOutput
 from bluefoot_mpc.io.safety import ArmingInterruptedError, SafetyState, SafetySupervisor
 from bluefoot_mpc.runtime.data import COMPLETED, CommandRecord, RunData
 from bluefoot_mpc.runtime.garbage import YoungCollection
+from bluefoot_mpc.runtime.interruption import interruptible
 from bluefoot_mpc.runtime.recorder import Recorder
 from bluefoot_mpc.types import (
     N_JOINTS,
@@ -38,7 +36,6 @@ from bluefoot_mpc.types import (
 log = logging.getLogger(__name__)
 
 INTERRUPTED = "interrupted"
-_ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 AFTER_FALL = 1.0
 """s that are still recorded after a fall, limp."""
 REST_TIMEOUT = 6.0
@@ -101,7 +98,7 @@ def run_loop(
     """
     data = RunData(period=robot.period, config=config)
     started = time.perf_counter()
-    with _interruptible(robot.interrupt) as interrupted, YoungCollection() as garbage:
+    with interruptible(robot.interrupt) as interrupted, YoungCollection() as garbage:
         try:
             controller.reset()
             frame = robot.reset()
@@ -158,6 +155,9 @@ def _ticks(
         frame = robot.step(output.command)
         reason = ending.reason(robot, telemetry.mode, motion.mode if hooks.rests else None, now)
         if reason is not None:
+            if hooks.rests:
+                # Whoever has not come to rest in time is lowered, not dropped; one that is off stays so.
+                robot.controlled_stop("the controller has not brought the robot to rest in time")
             return reason or _safe_reason(data)
 
 
@@ -282,30 +282,3 @@ def _safe_reason(data: RunData) -> str:
                     f"stopped at {telemetry.time:.2f} s: {event.split('-> safe', 1)[1].strip() or 'unknown'}"
                 )
     return "stopped"
-
-
-@contextmanager
-def _interruptible(tell: Callable[[], None]) -> Iterator[threading.Event]:
-    """Turn the first Ctrl-C (or termination, or hang-up) into an event; a second one interrupts for real.
-
-    `tell` is called from the signal's handler at the first.
-    """
-    event = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield event
-        return
-
-    def handle(number: int, stack: FrameType | None) -> None:
-        if event.is_set():
-            raise KeyboardInterrupt
-        event.set()
-        tell()
-
-    # What is ignored stays so: nohup, and commands in the background of a script.
-    heard = [number for number in _ENDINGS if signal.getsignal(number) is not signal.SIG_IGN]
-    previous = {number: signal.signal(number, handle) for number in heard}
-    try:
-        yield event
-    finally:
-        for number, handler in previous.items():
-            signal.signal(number, handler)
