@@ -144,6 +144,16 @@ def run_commanded(
     watched = options.view or options.station is not None
     paced = watched if presentation.paced is None else presentation.paced
     made = _prepare(resolved, paced)
+    try:
+        return _run_made(made, source, resolved, options, presentation)
+    finally:
+        # Where the run did not even begin, too: a robot holds ports, and has processes beside this one.
+        made.on.robot.close()
+
+
+def _run_made(
+    made: _Made, source: CommandSource, resolved: Resolved, options: RunOptions, presentation: Presentation
+) -> RunResult:
     on = made.on
     folder = make_folder(options, resolved.run.scenario)
     if resolved.stages.control.leveling.loads_weights:

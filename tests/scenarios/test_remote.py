@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.io.link import LinkError
 from bluefoot_mpc.io.station.client import RemoteRobot
 from bluefoot_mpc.io.station.ground_end import Order
 from bluefoot_mpc.io.station.steps import Steps
-from bluefoot_mpc.scenarios import RunOptions, run
+from bluefoot_mpc.scenarios import RunOptions, run, runner
+from bluefoot_mpc.scenarios.robots import make_robot
 from bluefoot_mpc.scenarios.stationed import StationedRun
 from bluefoot_mpc.types import Mode, MotionCommand
 
@@ -181,3 +183,19 @@ def test_a_robot_is_walked_stopped_and_armed_by_radio(tmp_path):
         remote.close()
     assert walked > 0.1
     assert "ground station" in results[0].summary["stop_reason"]
+
+
+def test_a_run_that_does_not_begin_gives_its_robot_back(monkeypatch, tmp_path):
+    closed = []
+
+    def made(*args):
+        on = make_robot(*args)
+        close = on.robot.close
+        on.robot.close = lambda: (closed.append(True), close())
+        return on
+
+    monkeypatch.setattr(runner, "make_robot", made)
+    options = RunOptions(robot="emulator", station="udp:nowhere.invalid:1", out=tmp_path / "run")
+    with pytest.raises(LinkError, match="the host is not known"):
+        run("remote", options)
+    assert closed
