@@ -107,14 +107,19 @@ class WatchdogProcess:
             if not self._lost and not self._closed:
                 self._lost = self._exchange(watchdog.PORT + bytes((index,)), handed)
 
-    def close(self) -> None:
-        """Dismiss it: torque is off already. Idempotent, never raises."""
+    def close(self, *, is_off: bool = True) -> None:
+        """Dismiss it. Idempotent, never raises.
+
+        Args:
+            is_off: torque is known to be off; where it is not, the process tries it before it ends.
+        """
         with self._lock:
             if self._closed:
                 return
             self._closed = True
-            with contextlib.suppress(OSError):
-                self._channel.send(watchdog.FAREWELL)
+            if is_off:
+                with contextlib.suppress(OSError):
+                    self._channel.send(watchdog.FAREWELL)
             self._channel.close()
         try:
             self._process.wait(timeout=2.0 * watchdog.RETRY)

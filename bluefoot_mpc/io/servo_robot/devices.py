@@ -251,17 +251,18 @@ class DeviceCycle:
         if self._devices.board is not None:
             self._devices.board.cut()
 
-    def close(self) -> None:
-        """Cut the servos' supply, hear whether it is off, and give back every port."""
-        devices = self._devices
+    def close(self) -> bool:
+        """Cut the servos' supply, and give back every port; True where the board says that it is off."""
+        devices, is_off = self._devices, False
         if devices.board is not None and self._joints is not None:
             devices.board.cut()
-            devices.board.wait_power(False, _CUT_TIME)
+            is_off = devices.board.wait_power(False, _CUT_TIME)
         for bus in devices.buses:
             bus.link.close()
         for device in (devices.board, devices.lidar, devices.camera):
             if device is not None:
                 device.close()
+        return is_off
 
     # -- every period ----------------------------------------------------------
 

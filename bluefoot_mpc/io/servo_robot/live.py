@@ -68,6 +68,7 @@ class LiveRobot:
         self._given_at = clock.now()
         self._is_new = False
         self._is_armed = self._is_watched = self._has_torque = False
+        self._is_sure = True
         self._frame: SensorFrame | None = None
         self._count = self._taken = 0
         self._ending = self._is_closed = False
@@ -169,9 +170,9 @@ class LiveRobot:
         if self._is_closed:
             return
         self._is_closed = True
+        is_off = self._cycle.close() or (self._is_sure and not self._has_torque)
         if self._watchdog is not None:
-            self._watchdog.close()
-        self._cycle.close()
+            self._watchdog.close(is_off=is_off)
         if self._on_close is not None:
             self._on_close()
 
@@ -262,7 +263,7 @@ class LiveRobot:
     def _switch_off(self, reason: str, *, verified: bool) -> None:
         self._is_armed = False
         findings = self._cycle.off(reason) if verified else self._cycle.cut(reason)
-        self._has_torque = False
+        self._has_torque, self._is_sure = False, not findings
         self._is_off.set()
         for finding in findings:
             log.warning("%s", finding)
@@ -294,7 +295,8 @@ class LiveRobot:
         try:
             self._cycle.arm(torque_limit)
         except BaseException:
-            self._has_torque = False
+            # Perhaps not of every servo: the supply's end at `close` tells.
+            self._has_torque = self._is_sure = False
             self._is_off.set()
             raise
         self._setpoint, self._given_at = None, self._clock.now()

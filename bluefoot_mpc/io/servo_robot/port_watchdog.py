@@ -50,9 +50,9 @@ class PortWatchdog:
                 self._hand_over(index, link)
         return self._process.beat()
 
-    def close(self) -> None:
-        """Dismiss it: torque is off already."""
-        self._process.close()
+    def close(self, *, is_off: bool = True) -> None:
+        """Dismiss it; where it is not known that torque is off, it tries to switch it off before it ends."""
+        self._process.close(is_off=is_off)
 
     def _hand_over(self, index: int, link: SerialLink) -> None:
         try:

@@ -226,3 +226,11 @@ def test_the_module_runs_by_name_and_says_what_it_needs():
     told = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     assert "--channel" in told.stdout
     assert told.stderr == ""
+
+
+def test_a_program_that_does_not_know_whether_torque_is_off_leaves_it_to_the_watchdog(ports):
+    process = WatchdogProcess([GuardedPort(ports[0].path, 1_000_000, TORQUE_OFF, ports[0].slave)], 10.0)
+    assert process.beat()
+    process.close(is_off=False)
+    assert ports[0].read(6 * len(TORQUE_OFF)) == 6 * TORQUE_OFF
+    assert gone(process.pid)
