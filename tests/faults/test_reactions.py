@@ -11,6 +11,8 @@ from tests.faults.rig import SLOWEST, SPEED, Plan, Rig
 from tests.faults.table import AT, CASES, OFF_TIME, Case, Reaction
 
 ALL = [pytest.param(case, id=case.name.replace(" ", "-")) for cases in CASES.values() for case in cases]
+ENDING = (Reaction.FREEZES, Reaction.STOPS, Reaction.DROPS, Reaction.CUTS)
+"""Reactions after which the run is ended in the regular way."""
 STILL_WALKS = 0.75 * SPEED
 """m/s that a disturbed robot must make at least."""
 GAIT_END = 1.3
@@ -23,7 +25,7 @@ FASTEST_SINKING = 0.3
 def test_reaction(case: Case, tmp_path, caplog):
     plan = Plan(
         faults=case.faults, actions=dict(case.actions), spoil=case.spoil, lidar=case.lidar, end=case.end,
-        rests=case.reaction is not Reaction.WALKS_ON or bool(case.logs),
+        rests=case.reaction in ENDING or bool(case.logs),
     )  # fmt: skip
     rig = Rig(plan, tmp_path).run()
     CHECKS[case.reaction](rig, case)
