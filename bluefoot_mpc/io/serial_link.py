@@ -24,8 +24,12 @@ from serial.tools import list_ports
 from bluefoot_mpc.io.clock import Clock
 from bluefoot_mpc.io.link import LinkError, LinkLostError
 
-WRITE_PATIENCE = 0.5
-"""Seconds after which a port that takes no bytes counts as lost."""
+WRITE_PATIENCE = 0.2
+"""Seconds after which a port that takes no bytes counts as lost.
+
+It has kilobytes of room, so it has been hanging for longer already. Whoever waits must be back before
+guard and watchdog process give the program up, which they do after 0.5 s.
+"""
 
 MOST_AT_ONCE = 4096
 """Bytes asked of the system when old ones are thrown away."""
@@ -91,7 +95,7 @@ class SerialLink:
         """Hand bytes to the system; returns before they have left.
 
         Raises:
-            LinkLostError: the port is gone, or takes nothing for half a second.
+            LinkLostError: the port is gone, or takes nothing for `WRITE_PATIENCE`.
         """
         try:
             sent = os.write(self.fileno(), data)

@@ -245,7 +245,8 @@ def _record(
     output: ControlOutput,
 ) -> None:
     truth = hooks.truth() if hooks.truth is not None else None
-    data.frames.append(frame)
+    # Pictures are in the log; an hour of them would not fit into memory.
+    data.frames.append(frame if frame.camera is None else replace(frame, camera=None))
     data.commands.append(CommandRecord(time=frame.time, motion=motion, safety=safety, joints=output.command))
     data.telemetry.append(output.telemetry)
     if truth is not None:

@@ -10,8 +10,9 @@ import pytest
 from bluefoot_mpc.io.board.framing import encode_frame
 from bluefoot_mpc.io.board.messages import Kind
 from bluefoot_mpc.io.clock import MonotonicClock
+from bluefoot_mpc.io.safety.guard import GuardConfig
 from bluefoot_mpc.io.safety.watchdog_process import TORQUE_OFF
-from bluefoot_mpc.io.serial_link import SerialLink
+from bluefoot_mpc.io.serial_link import WRITE_PATIENCE, SerialLink
 from bluefoot_mpc.io.servo_robot.port_watchdog import PortWatchdog
 
 PATIENCE = 20.0  # s, on a machine that others use as well
@@ -101,3 +102,7 @@ def test_ports_that_came_back_are_switched_off_when_the_program_falls_silent(rob
     assert watchdog.beat()
     assert servos.hears(TORQUE_OFF)
     assert board.hears(encode_frame(Kind.POWER_CUT, 0))
+
+
+def test_two_ports_that_hang_are_given_up_before_the_program_is():
+    assert GuardConfig().off_after > 2.0 * WRITE_PATIENCE
