@@ -24,6 +24,10 @@ _NO_SAMPLES = ImuBatch(
     magnetometer=np.empty((0, 3)), valid=np.empty(0, dtype=np.bool_),
 )  # fmt: skip
 
+_MAX_AGE = 3.0
+"""s after which temperature and voltage of a servo are not known any more: they come every 0.32 s, or every
+second and a half on a slow adapter."""
+
 
 def sensor_frame(
     time: float,
@@ -35,8 +39,9 @@ def sensor_frame(
 ) -> SensorFrame:
     """Put the newest readings together; what is not known is not valid.
 
-    A joint that did not answer keeps its last position, marked. The voltage is
-    the board's, and the servos' own where there is no board.
+    A joint that did not answer keeps its last position, marked; a temperature that
+    is too old is NaN. The voltage is the board's, and the servos' own where there is
+    no board.
 
     Args:
         time: s, of the frame.
@@ -46,13 +51,14 @@ def sensor_frame(
         lidar: newest scan, when new.
         camera: newest picture, when new.
     """
-    voltage, voltage_valid = _voltage(joints, board)
+    is_known = time - joints.full_times <= _MAX_AGE
+    voltage, voltage_valid = _voltage(joints.voltage[is_known], board)
     return SensorFrame(
         time=time,
         joint_position=calibration.angles(joints.counts),
         joint_speed=calibration.signs * joints.speed,
         joint_load=calibration.signs * joints.load,
-        joint_temperature=joints.temperature,
+        joint_temperature=np.where(is_known, joints.temperature, math.nan),
         joint_time=joints.times,
         joint_valid=joints.fresh,
         voltage=voltage,
@@ -66,8 +72,8 @@ def sensor_frame(
     )
 
 
-def _voltage(joints: Readings, board: BoardReadings | None) -> tuple[float, bool]:
+def _voltage(servos: FloatArray, board: BoardReadings | None) -> tuple[float, bool]:
     if board is not None and board.voltage_valid:
         return board.voltage, True
-    known: FloatArray = joints.voltage[np.isfinite(joints.voltage)]
+    known: FloatArray = servos[np.isfinite(servos)]
     return (float(np.median(known)), True) if known.size > N_JOINTS // 2 else (math.nan, False)
