@@ -144,3 +144,13 @@ CHECKS = {
     Reaction.CUTS: check_cuts,
     Reaction.REFUSES: check_refuses,
 }
+
+
+@pytest.mark.parametrize("kind", ["wrong_id", "wrong_length", "late_reply", "drop_reply"])
+def test_the_driver_never_talks_over_a_reply(kind, tmp_path):
+    """Not even where hardly any reply can be used, so that every request costs its longest time."""
+    faults = [{"kind": kind, "start": AT, "probability": 0.9}]
+    rig = Rig(Plan(faults=faults, end=AT + 2.5), tmp_path).run()
+    assert rig.parts.report()["protocol_violations"] == {}
+    assert np.diff(rig.times).max() <= SLOWEST
+    assert rig.parts.report()["torque_on"] == []

@@ -151,6 +151,7 @@ def test_a_program_that_is_killed_or_halted_leaves_no_torque_on(number, tmp_path
     stuck = until_armed()
     plan.write_text(STUCK.format(stuck))
     emulator, options = emulator_and_options(tmp_path, plan)
+    stuck += emulator.truth().time  # a plan's times count from when its line began
     command = [sys.executable, "-m", "bluefoot_mpc.cli", "run", "stand", "--robot", "hardware", *options]
     program = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
