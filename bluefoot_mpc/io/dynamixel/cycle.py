@@ -1,7 +1,7 @@
 """The cycle of all servos: one sync write, sixteen positions, one full reading in turn; fifty times a second.
 
 Lost replies are values, not exceptions: a reading has a time and says whether
-it is fresh. A servo that stays silent is left out and asked five times a second, so
+it is fresh. A servo that stays silent is left out, asked soon and then once a second, so
 that it does not slow the others. One that was gone is looked at before it gets
 another goal, for a goal switches torque on: when it has lost its RAM, goals are
 withheld until it is armed again.
@@ -51,7 +51,7 @@ class Readings:
         temperature: (16,) °C.
         full_times: (16,) s, when each servo measured speed, load, voltage and temperature.
         errors: (16,) error bits (`ErrorBit`) of each servo's newest reply.
-        suspects: (16,) True where a servo is left out and asked five times a second.
+        suspects: (16,) True where a servo is left out and asked now and then.
         returned: (16,) True where a servo lost its RAM: it is limp, and gets no goal until it is armed.
         shut: (16,) True where a servo reported overheating or overload since it was armed.
         lost_ports: names of ports that are gone.

@@ -30,12 +30,16 @@ class CycleConfig:
     """How the cycle deals with servos that do not answer."""
 
     misses: int = 5  # cycles in a row without a reply after which a servo is left out
-    probe_period: float = 0.2  # s between questions to one that is left out; 0.5 s of silence is a fault
+    first_probe: float = 0.2  # s until one that is left out is asked again; 0.5 s of silence is a fault
+    probe_period: float = 1.0  # s between questions after that
     reopen_period: float = 0.1  # s between attempts to open a lost port again
     limit_repeats: int = 2  # how often a new torque limit is sent once more: nobody acknowledges it
 
     def __post_init__(self) -> None:
-        require_positive(misses=self.misses, probe_period=self.probe_period, reopen_period=self.reopen_period)
+        require_positive(
+            misses=self.misses, first_probe=self.first_probe, probe_period=self.probe_period,
+            reopen_period=self.reopen_period,
+        )  # fmt: skip
         require_nonnegative(limit_repeats=self.limit_repeats)
 
 
@@ -279,7 +283,7 @@ class PortCycle:
         servo.doubtful = True
         if servo.misses >= self._config.misses and not servo.suspect:
             servo.suspect = True
-            servo.probe_at = self._clock.now() + self._config.probe_period
+            servo.probe_at = self._clock.now() + self._config.first_probe
             log.warning(
                 "%s has not answered %d times in a row: left out. Check its cable", servo.part, servo.misses
             )
