@@ -6,28 +6,20 @@ import contextlib
 import logging
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
-from bluefoot_mpc.io.board.driver import SensorBoard
 from bluefoot_mpc.io.board.readings import BoardReadings
-from bluefoot_mpc.io.calibration import Calibration
-from bluefoot_mpc.io.calibration import findings as calibration_findings
-from bluefoot_mpc.io.camera import Camera
 from bluefoot_mpc.io.clock import Clock
 from bluefoot_mpc.io.dynamixel import arming, units
-from bluefoot_mpc.io.dynamixel.arming import CheckConfig
-from bluefoot_mpc.io.dynamixel.bus import ServoBus
-from bluefoot_mpc.io.dynamixel.cycle import BusCycle, Readings
-from bluefoot_mpc.io.dynamixel.errors import ServoError
-from bluefoot_mpc.io.dynamixel.layout import ServoLayout
+from bluefoot_mpc.io.dynamixel.cycle import Readings
 from bluefoot_mpc.io.findings import Finding, NotArmedError, Severity
-from bluefoot_mpc.io.lidar.driver import Lidar
 from bluefoot_mpc.io.lidar.errors import LidarError
 from bluefoot_mpc.io.safety.health import Health
+from bluefoot_mpc.io.servo_robot.bundle import Devices
 from bluefoot_mpc.io.servo_robot.config import DevicesConfig
 from bluefoot_mpc.io.servo_robot.frames import sensor_frame
+from bluefoot_mpc.io.servo_robot.preflight import preflight, switch_findings
 from bluefoot_mpc.model.servo import FULL_DUTY
 from bluefoot_mpc.types import N_LEGS, BoolArray, JointCommand, SensorFrame
 
@@ -35,12 +27,6 @@ log = logging.getLogger(__name__)
 
 _LATELY = 50
 """Cycles whose reading times decide how early reading starts."""
-_NO_BOARD = Finding(
-    part="sensor board",
-    text="there is none, and a robot without inertial sensor and foot switches cannot stand",
-    mend="Name its port: --set devices.board_port=/dev/ttyACM0",
-    severity=Severity.REFUSAL,
-)
 _STILL_ON = Finding(
     part="power board",
     text="the servos' supply is still on after the board was told to cut it",
@@ -60,31 +46,6 @@ _TRIES = 5
 """Periods more in which all servos may answer while the robot is being armed."""
 _BOOT = 0.3
 """s that servos need after their supply came on."""
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Devices:
-    """Drivers of everything that the robot has.
-
-    Attributes:
-        buses: of the servos, one for each port.
-        cycle: scheduler on these buses.
-        layout: which servo drives which joint.
-        calibration: signs, offsets, IDs.
-        board: sensor and power board; None without one.
-        lidar: None without one.
-        camera: None without one.
-        model: name of the parameter set that the robot runs with.
-    """
-
-    buses: tuple[ServoBus, ...]
-    cycle: BusCycle
-    layout: ServoLayout
-    calibration: Calibration
-    board: SensorBoard | None = None
-    lidar: Lidar | None = None
-    camera: Camera | None = None
-    model: str = "bluefoot"
 
 
 class DeviceCycle:
@@ -166,28 +127,7 @@ class DeviceCycle:
             self._supply()
             self.restart()
             self.collect()
-        devices, config = self._devices, CheckConfig(least_voltage=self._config.arming_voltage)
-        found: list[Finding] = []
-        found += devices.board.findings() if devices.board is not None else [_NO_BOARD]
-        found += devices.lidar.findings() if devices.lidar is not None else ()
-        found += devices.camera.findings() if devices.camera is not None else ()
-        for leg in range(N_LEGS):
-            joints = range(4 * leg, 4 * leg + 4)
-            found += arming.check_servos(devices.buses, devices.layout, config, joints)
-            self._beat()
-        found += calibration_findings(devices.calibration, devices.model, self._identities())
-        # Ports are looked at once for each leg.
-        return tuple({(finding.part, finding.text): finding for finding in found}.values())
-
-    def _identities(self) -> dict[int, tuple[int, int]]:
-        """Model number and firmware of the servos that answer, by ID."""
-        layout, seen = self._devices.layout, {}
-        for servo, port in zip(layout.ids, layout.ports, strict=True):
-            # One that is silent has its finding already.
-            with contextlib.suppress(ServoError):
-                block = self._devices.buses[port].read_block(servo, 0, 3, tries=1)
-                seen[servo] = (block[0] | block[1] << 8, block[2])
-        return seen
+        return preflight(self._devices, self._config.arming_voltage, self._beat)
 
     def arm(self, torque_limit: float) -> None:
         """Hold the present position with a low torque limit.
@@ -321,7 +261,7 @@ class DeviceCycle:
             restarted=_where(joints.returned),
             silent=_where(joints.suspects),
             put_off=_where(joints.put_off),
-            findings=() if board is None else _switch_findings(board),
+            findings=() if board is None else switch_findings(board),
         )
 
     @property
@@ -338,12 +278,3 @@ class DeviceCycle:
 def _where(joints: BoolArray) -> tuple[int, ...]:
     """Numbers of the joints that are marked."""
     return tuple(np.flatnonzero(joints).tolist())
-
-
-def _switch_findings(board: BoardReadings) -> tuple[Finding, ...]:
-    """Foot switches that cannot be trusted: the robot walks on without them, and people should know."""
-    faults = (fault.partition(": ") for fault in board.faults if fault.startswith("foot switch"))
-    mend = "Check the switch and its cable"
-    return tuple(
-        Finding(part=part, text=text, mend=mend, severity=Severity.WARNING) for part, _, text in faults
-    )

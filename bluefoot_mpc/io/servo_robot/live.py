@@ -14,8 +14,9 @@ from bluefoot_mpc.io.clock import Clock
 from bluefoot_mpc.io.findings import Finding, Severity
 from bluefoot_mpc.io.safety.guard import Guard, GuardState
 from bluefoot_mpc.io.safety.health import Health
+from bluefoot_mpc.io.servo_robot.bundle import Devices
 from bluefoot_mpc.io.servo_robot.config import DevicesConfig
-from bluefoot_mpc.io.servo_robot.devices import DeviceCycle, Devices
+from bluefoot_mpc.io.servo_robot.devices import DeviceCycle
 from bluefoot_mpc.io.servo_robot.port_watchdog import PortWatchdog
 from bluefoot_mpc.types import FloatArray, JointCommand, SensorFrame
 

@@ -14,7 +14,7 @@ from bluefoot_mpc.io.dynamixel.latch import Latch
 from bluefoot_mpc.io.dynamixel.layout import spread
 from bluefoot_mpc.io.lidar.driver import Lidar
 from bluefoot_mpc.io.link import Link
-from bluefoot_mpc.io.servo_robot.devices import Devices
+from bluefoot_mpc.io.servo_robot.bundle import Devices
 
 BOARD_BAUD = 115_200
 """bit/s of the sensor board's port (docs/board-protocol.md)."""

@@ -9,8 +9,9 @@ from bluefoot_mpc.io.clock import Clock
 from bluefoot_mpc.io.findings import Finding
 from bluefoot_mpc.io.safety.guard import Guard, GuardState
 from bluefoot_mpc.io.safety.health import Health
+from bluefoot_mpc.io.servo_robot.bundle import Devices
 from bluefoot_mpc.io.servo_robot.config import DevicesConfig
-from bluefoot_mpc.io.servo_robot.devices import DeviceCycle, Devices
+from bluefoot_mpc.io.servo_robot.devices import DeviceCycle
 from bluefoot_mpc.types import FloatArray, JointCommand, SensorFrame
 
 log = logging.getLogger(__name__)
