@@ -190,7 +190,8 @@ class _Ending:
             now: s since the start.
         """
         if robot.state is SafetyState.EMERGENCY:
-            return robot.request.reasons[-1] if robot.request.reasons else "emergency stop"
+            told = (reason for reason in robot.request.reasons if reason.startswith("emergency"))
+            return next(told, "emergency stop")
         if mode is Mode.SAFE:
             self.stopping_since = min(self.stopping_since, now)
             if robot.limp and now - self.stopping_since >= AFTER_FALL:

@@ -11,12 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import orjson
 
-from bluefoot_mpc.control.config import ControlConfig
 from bluefoot_mpc.control.pipeline import Pipeline
-from bluefoot_mpc.exceptions import ConfigurationError, LogError
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.io.robot import Robot
 from bluefoot_mpc.io.safety import SafetySupervisor
-from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.runtime.loop import INTERRUPTED, CommandSource, LoopHooks, Observer, run_loop
@@ -35,13 +33,12 @@ from bluefoot_mpc.scenarios.folder import (
     keep_weights,
     log_in,
     make_folder,
-    start_weights,
     writing,
 )
 from bluefoot_mpc.scenarios.options import RunOptions
 from bluefoot_mpc.scenarios.registry import find_scenario
 from bluefoot_mpc.scenarios.robots import RunRobot, device_criteria, make_robot
-from bluefoot_mpc.settings import build, dump_toml
+from bluefoot_mpc.settings import dump_toml
 from bluefoot_mpc.sim.body import Posture
 from bluefoot_mpc.viz.live import LiveView
 from bluefoot_mpc.viz.report import write_report
@@ -287,29 +284,6 @@ def _drive(
 def supervise(robot: Robot, model: RobotModel, resolved: Resolved) -> SafetySupervisor:
     """The robot behind its safety supervisor."""
     return SafetySupervisor(robot, model.lower, model.upper, resolved.stages.safety)
-
-
-def pipeline_from_log(data: RunData, folder: Path | None = None) -> Pipeline:
-    """The controller that a log's configuration describes, as today's code builds it.
-
-    Args:
-        data: the run.
-        folder: where its log lies, with the weights that its network began with; None where they
-            are to be read from where the configuration says.
-
-    Raises:
-        LogError: the log does not hold a configuration that today's code understands, or the
-            weights are gone.
-    """
-    try:
-        parameters = build(RobotParameters, data.config["model"], "model")
-        control = build(ControlConfig, data.config["control"], "control")
-    except (KeyError, ConfigurationError) as error:
-        raise LogError(f"the log's configuration does not fit this version: {error}") from error
-    if folder is not None and control.leveling.loads_weights:
-        leveling = dataclasses.replace(control.leveling, weights=start_weights(folder))
-        control = dataclasses.replace(control, leveling=leveling)
-    return Pipeline(RobotModel(parameters), control, data.period)
 
 
 def _judge(data: RunData, resolved: Resolved, made: _Made, folder: Path) -> RunResult:
