@@ -8,6 +8,9 @@ from dataclasses import dataclass
 
 from bluefoot_mpc.exceptions import DeviceError
 
+_NAMED = 4
+"""Parts that are named one by one."""
+
 
 class Severity(enum.IntEnum):
     """How much a finding matters; higher is worse."""
@@ -48,5 +51,21 @@ class NotArmedError(DeviceError):
 
     def __init__(self, findings: Sequence[Finding]) -> None:
         self.findings = tuple(findings)
-        bad = [str(finding) for finding in findings if finding.severity is Severity.REFUSAL]
-        super().__init__("not armed, no torque is on:\n  " + "\n  ".join(bad))
+        bad = [finding for finding in findings if finding.severity is Severity.REFUSAL]
+        super().__init__("not armed, no torque is on:\n  " + "\n  ".join(_grouped(bad)))
+
+
+def _grouped(findings: Sequence[Finding]) -> list[str]:
+    """A line for each thing that is wrong; parts with the same trouble share one."""
+    parts: dict[tuple[str, str], list[str]] = {}
+    for finding in findings:
+        parts.setdefault((finding.text, finding.mend), []).append(finding.part)
+    lines = []
+    for (text, mend), named in parts.items():
+        shown = (
+            ", ".join(named)
+            if len(named) <= _NAMED
+            else f"{', '.join(named[:2])} … {named[-1]}, {len(named)} in all"
+        )
+        lines.append(str(Finding(part=shown, text=text, mend=mend)))
+    return lines

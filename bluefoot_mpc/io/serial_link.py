@@ -259,7 +259,7 @@ class SerialLink:
 
     def _why_not(self, error: Exception) -> str:
         """Port, cause and way out of a failed opening."""
-        number = getattr(error, "errno", None)
+        number = getattr(error, "errno", None) or (error.args[0] if error.args else None)
         if not Path(self.name).exists() or number in {errno.ENOENT, errno.ENXIO, errno.ENODEV}:
             there = ", ".join(available_ports()) or "none: check the USB cable and the adapter's power"
             return f"there is no port {self.name}. Ports that exist: {there}"
@@ -270,7 +270,7 @@ class SerialLink:
             )
         if number in _BUSY:
             return f"{self.name} is busy: another program has it open. Close it (see `fuser {self.name}`)"
-        if not stat.S_ISCHR(os.stat(self.name).st_mode):
+        if number == errno.ENOTTY or not stat.S_ISCHR(os.stat(self.name).st_mode):
             return (
                 f"{self.name} is no serial port. Ports that exist: {', '.join(available_ports()) or 'none'}"
             )

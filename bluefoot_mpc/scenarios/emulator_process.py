@@ -8,6 +8,8 @@ saw. The process ends when its input does, so it never outlives who started it.
 
 from __future__ import annotations
 
+import contextlib
+import os
 import signal
 import sys
 import threading
@@ -108,7 +110,11 @@ def main() -> None:
         ended.set()
 
     threading.Thread(target=wait, name="input", daemon=True).start()
-    serve(Order(**orjson.loads(line)), ended)
+    # Whoever started this process was killed: it ends without a word.
+    with contextlib.suppress(BrokenPipeError):
+        serve(Order(**orjson.loads(line)), ended)
+        return
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _tell(value: dict[str, Any]) -> None:

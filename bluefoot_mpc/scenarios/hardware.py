@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 
 from bluefoot_mpc.exceptions import ConfigurationError
@@ -44,6 +45,7 @@ def make_hardware(resolved: Resolved, model: RobotModel) -> RunRobot:
         raise ConfigurationError(
             "--robot hardware needs the sensor board's port: --set devices.board_port=/dev/ttyACM0"
         )
+    _require_different((*config.ports, config.board_port, config.lidar_port))
     calibration = load_calibration(config.calibration)
     robot = live_robot(
         config, calibration, MonotonicClock(), config.ports, config.board_port, model=model.parameters.name
@@ -97,3 +99,15 @@ def live_robot(
         for link in opened:
             link.close()
         raise
+
+
+def _require_different(ports: Sequence[str]) -> None:
+    """Refuse a port that is given twice, under whatever names."""
+    places: dict[str, str] = {}
+    for port in ports:
+        place = os.path.realpath(port)
+        if port and place in places:
+            raise ConfigurationError(
+                f"{places[place]} and {port} are one port: servos, sensor board and LIDAR need one each"
+            )
+        places[place] = port

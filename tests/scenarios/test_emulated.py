@@ -151,3 +151,12 @@ def test_hardware_needs_ports():
         simulate("stand", RunOptions(robot="hardware"))
     with pytest.raises(ConfigurationError, match=r"devices\.board_port"):
         simulate("stand", RunOptions(robot="hardware", port=("/dev/null",)))
+
+
+def test_a_port_given_twice_is_wrong_use(tmp_path):
+    link = tmp_path / "link"
+    link.symlink_to("/dev/null")
+    for ports, board in ((("/dev/null", str(link)), "/dev/zero"), (("/dev/null",), str(link))):
+        options = RunOptions(robot="hardware", port=ports, overrides=(f"devices.board_port={board!r}",))
+        with pytest.raises(ConfigurationError, match=r"are one port"):
+            simulate("stand", options)

@@ -229,7 +229,9 @@ class InertialMonitor:
         if self._age > self._config.imu_sit + _SLACK:
             text = f"no usable inertial sample for {self._config.imu_sit:g} s: the robot sits down"
             return [Fault(key="inertial sit", response=Response.SIT, text=f"{text}. {_IMU}")]
-        return [Fault(key="inertial", response=Response.HOLD, text=f"{text}. {_IMU}", latched=False)]
+        # The controller, blind by then, stops and goes on by itself; a robot with power ends its gait too.
+        response = Response.HOLD if self._required else Response.WARN
+        return [Fault(key="inertial", response=response, text=f"{text}. {_IMU}", latched=not self._required)]
 
     def _usable(self, frame: SensorFrame) -> bool:
         imu = frame.imu
