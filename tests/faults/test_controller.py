@@ -9,6 +9,8 @@ from bluefoot_mpc.io.calibration import Calibration
 from tests.faults.rig import PERIOD, Plan, Rig
 from tests.faults.table import AT, TICK, spoil_goals
 
+pytestmark = pytest.mark.slow
+
 FASTEST = 12.0
 """rad/s, of goals."""
 

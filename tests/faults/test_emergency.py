@@ -10,6 +10,8 @@ from bluefoot_mpc.types import JointCommand
 from tests.faults.rig import Plan, Rig
 from tests.faults.table import AT, OFF_TIME, board, fault, spoil_goals
 
+pytestmark = pytest.mark.slow
+
 STATES = {
     "active": (AT, {}),
     "hold": (AT + 0.3, {"actions": {AT: board(imu_silent=True)}}),

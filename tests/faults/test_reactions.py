@@ -10,6 +10,8 @@ from bluefoot_mpc.types import Mode
 from tests.faults.rig import SLOWEST, SPEED, Plan, Rig
 from tests.faults.table import AT, CASES, OFF_TIME, Case, Reaction
 
+pytestmark = pytest.mark.slow
+
 ALL = [pytest.param(case, id=case.name.replace(" ", "-")) for cases in CASES.values() for case in cases]
 ENDING = (Reaction.FREEZES, Reaction.STOPS, Reaction.DROPS, Reaction.CUTS)
 """Reactions after which the run is ended in the regular way."""
