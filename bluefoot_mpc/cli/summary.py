@@ -30,7 +30,7 @@ _UNITS = {
     "j": "J",
     "w": "W",
 }
-_NOT_SHOWN = ("window_s",)
+_NOT_SHOWN = ("window_s", "devices")
 _CHANGE = re.compile(r"(mode|gait) \S+ -> \S+$")
 """What is no news: a change without a reason was commanded."""
 _EVENTS_SHOWN = 5
