@@ -88,9 +88,9 @@ def findings_table(findings: Sequence[Finding], title: str) -> Table:
 
 
 def _grouped(findings: Sequence[Finding]) -> list[Finding]:
-    """Findings with those that say the same of several servos as one."""
+    """Findings with those that say the same of several servos as one, and what two checks found only once."""
     groups: dict[tuple[str, str, Severity, int], list[Finding]] = {}
-    for index, finding in enumerate(findings):
+    for index, finding in enumerate(dict.fromkeys(findings)):
         servo = finding.part.startswith("servo ")
         key = (finding.text, finding.mend, finding.severity, servo or index)
         groups.setdefault(key, []).append(finding)
