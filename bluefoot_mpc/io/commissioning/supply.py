@@ -68,6 +68,7 @@ class ServoSupply:
     def findings(self) -> tuple[Finding, ...]:
         """What the board says of itself and its sensors, from any thread."""
         with self._lock:
+            self.board.poll()  # a sample that waits in the port since the last beat is no silent sensor
             return self.board.findings()
 
     def _hear(self) -> None:

@@ -8,6 +8,7 @@ import pytest
 from bluefoot_mpc.cli.main import main
 from bluefoot_mpc.exceptions import DeviceError
 from bluefoot_mpc.io.clock import MonotonicClock
+from bluefoot_mpc.io.commissioning import supply as supply_module
 from bluefoot_mpc.io.commissioning.ports import limp_afterwards
 from bluefoot_mpc.io.commissioning.supply import ServoSupply
 from bluefoot_mpc.io.emulation.board import EmulatedBoard
@@ -75,6 +76,14 @@ def test_heartbeats_go_on_while_the_command_is_busy(robot):
         assert robot.source.powered
         assert all(not finding.mend for finding in supply.findings())
     assert not robot.source.powered
+
+
+def test_sensors_are_not_silent_because_nobody_has_listened_since_the_last_beat(robot, monkeypatch):
+    monkeypatch.setattr(supply_module, "BEAT", 0.2)  # s: longer than an IMU may be silent
+    clock = MonotonicClock()
+    with ServoSupply(SerialLink(robot.board, 115_200, clock), clock) as supply:
+        time.sleep(0.5)  # between two beats
+        assert all(not finding.mend for finding in supply.findings())
 
 
 def test_supply_goes_off_after_an_error(robot):
