@@ -16,6 +16,8 @@ from tests.io.board.bench import MadeUpRobot
 from tests.io.commissioning.bench import Bench
 from tests.io.lidar.bench import Room
 
+pytestmark = pytest.mark.slow
+
 
 def run(capfd, *words):
     status = main(["doctor", *words, "--json"])

@@ -13,6 +13,8 @@ from bluefoot_mpc.cli.emulator_arguments import parse_ids
 from bluefoot_mpc.cli.main import main
 from bluefoot_mpc.exceptions import ConfigurationError
 
+pytestmark = pytest.mark.slow
+
 PING_7 = bytes.fromhex("ffff070201f5")
 STATUS_7 = bytes.fromhex("ffff070200f6")
 

@@ -22,6 +22,8 @@ from bluefoot_mpc.io.emulation.own_shafts import ShaftConfig, bench_servo
 from bluefoot_mpc.types import JOINTS
 from tests.io.commissioning.bench import BAUD, ID, RETURN_DELAY, TORQUE, Bench
 
+pytestmark = pytest.mark.slow
+
 
 def run(capfd, port, *words):
     status = main([*words, "--port", port, "--json"])

@@ -22,6 +22,8 @@ from bluefoot_mpc.io.station.ground_end import Order
 from bluefoot_mpc.io.station.link import StationLink
 from bluefoot_mpc.types import Mode
 
+pytestmark = pytest.mark.slow
+
 
 class Clock:
     time = 100.0

@@ -10,6 +10,8 @@ from bluefoot_mpc.evaluation.validation_subject import subject_of
 from bluefoot_mpc.io.safety import SafetySupervisor
 from bluefoot_mpc.scenarios import RunOptions
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory):

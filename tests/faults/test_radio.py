@@ -15,6 +15,8 @@ from tests.faults.table import AT
 from tests.io.station.made_up import WALK
 from tests.io.station.test_signing import KEY, WALL, signing_peer
 
+pytestmark = pytest.mark.slow
+
 STICKS, BEATS = 0.04, 1.0
 """s between two messages of the sticks, and between two heartbeats."""
 

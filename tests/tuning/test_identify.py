@@ -24,6 +24,8 @@ from bluefoot_mpc.tuning.identify_page import load_steps, save_picture, save_ste
 
 from ..io.commissioning.bench import Bench as ServoBench
 
+pytestmark = pytest.mark.slow
+
 STIFFNESS_ERROR, ARMATURE_ERROR = 0.04, 0.05
 """Shares by which the fit may miss what the emulator has (docs/commissioning.md)."""
 COULOMB_ERROR, VISCOUS_ERROR, LATENCY_ERROR = 0.010, 0.006, 0.0015

@@ -19,6 +19,8 @@ from bluefoot_mpc.io.serial_link import SerialLink
 from ..board.bench import MadeUpRobot
 from .bench import Bench
 
+pytestmark = pytest.mark.slow
+
 
 class Powered(MadeUpRobot):
     """A robot whose servos live on what the board switches."""

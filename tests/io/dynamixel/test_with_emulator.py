@@ -18,6 +18,8 @@ from bluefoot_mpc.io.emulation.servo_line import ServoLine
 from bluefoot_mpc.io.findings import Severity
 from bluefoot_mpc.io.serial_link import SerialLink
 
+pytestmark = pytest.mark.slow
+
 LAYOUT = ServoLayout()
 PERIOD, BUDGET = 0.02, 0.016
 SPEED, LIMIT = np.zeros(16), np.full(16, 600.0)

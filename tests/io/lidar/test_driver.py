@@ -13,6 +13,8 @@ from bluefoot_mpc.io.lidar import LidarConfig, LidarError
 
 from .bench import Bench
 
+pytestmark = pytest.mark.slow
+
 
 def expected(seen):
     return np.where((seen < 20) | (seen > 5600), np.nan, seen * 0.001)

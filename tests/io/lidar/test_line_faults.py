@@ -16,6 +16,8 @@ from ..board.bench import MadeUpRobot
 from .bench import Room
 from .test_driver import expected
 
+pytestmark = pytest.mark.slow
+
 LINE_FAULTS = sorted(name for name, kind in KINDS.items() if not kind.servos_only)
 BEGIN, END = 1.0, 3.0
 PERIOD = 0.02

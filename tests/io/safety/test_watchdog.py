@@ -16,6 +16,8 @@ from bluefoot_mpc.io.safety import watchdog
 from bluefoot_mpc.io.safety.watchdog import GuardedPort, switch_off
 from bluefoot_mpc.io.safety.watchdog_process import TORQUE_OFF, WatchdogProcess
 
+pytestmark = pytest.mark.slow
+
 CUT = b"\xb5cut!"
 PATIENCE = 20.0  # s, on a machine that others use as well
 

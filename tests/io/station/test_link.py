@@ -25,6 +25,8 @@ from bluefoot_mpc.types import Mode, MotionCommand
 
 from .made_up import WALK, Peer, snapshot
 
+pytestmark = pytest.mark.slow
+
 
 def wait_for(condition, timeout=10.0):
     end = time.monotonic() + timeout
