@@ -19,7 +19,7 @@ from bluefoot_mpc.io.safety.health import Health
 from bluefoot_mpc.io.servo_robot.bundle import Devices
 from bluefoot_mpc.io.servo_robot.config import DevicesConfig
 from bluefoot_mpc.io.servo_robot.frames import sensor_frame
-from bluefoot_mpc.io.servo_robot.preflight import preflight, switch_findings
+from bluefoot_mpc.io.servo_robot.preflight import posture_findings, preflight, switch_findings
 from bluefoot_mpc.model.servo import FULL_DUTY
 from bluefoot_mpc.types import N_LEGS, BoolArray, JointCommand, SensorFrame
 
@@ -127,7 +127,10 @@ class DeviceCycle:
             self._supply()
             self.restart()
             self.collect()
-        return preflight(self._devices, self._config.arming_voltage, self._beat)
+        found = preflight(self._devices, self._config.arming_voltage, self._beat)
+        if self._joints is not None:
+            found += posture_findings(self._devices.calibration, self._joints.counts)
+        return found
 
     def arm(self, torque_limit: float) -> None:
         """Hold the present position with a low torque limit.

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable
 
+import numpy as np
+
 from bluefoot_mpc.io.board.readings import BoardReadings
+from bluefoot_mpc.io.calibration import Calibration
 from bluefoot_mpc.io.calibration import findings as calibration_findings
 from bluefoot_mpc.io.dynamixel.arming import CheckConfig, check_servos
 from bluefoot_mpc.io.dynamixel.errors import ServoError
 from bluefoot_mpc.io.findings import Finding, Severity
 from bluefoot_mpc.io.servo_robot.bundle import Devices
-from bluefoot_mpc.types import N_LEGS
+from bluefoot_mpc.types import JOINTS, N_LEGS, FloatArray
 
 _NO_BOARD = Finding(
     part="sensor board",
@@ -19,6 +23,8 @@ _NO_BOARD = Finding(
     mend="Name its port: --set devices.board_port=/dev/ttyACM0",
     severity=Severity.REFUSAL,
 )
+_SAG = math.radians(10.0)
+"""rad by which a limp leg may hang outside its soft limits."""
 
 
 def preflight(devices: Devices, least_voltage: float, beat: Callable[[], None]) -> tuple[Finding, ...]:
@@ -40,6 +46,27 @@ def preflight(devices: Devices, least_voltage: float, beat: Callable[[], None]) 
     found += calibration_findings(devices.calibration, devices.model, _identities(devices))
     # Ports are looked at once for each leg.
     return tuple({(finding.part, finding.text): finding for finding in found}.values())
+
+
+def posture_findings(calibration: Calibration, counts: FloatArray) -> tuple[Finding, ...]:
+    """Joints that cannot be where they seem to be: a horn was moved, or the calibration is another robot's.
+
+    Args:
+        calibration: signs, offsets and soft limits.
+        counts: (16,) present positions; NaN where unknown.
+    """
+    angles, (lower, upper) = calibration.angles(counts), calibration.soft_limits
+    beyond = np.maximum(lower - angles, angles - upper)
+    return tuple(
+        Finding(
+            part=f"servo {calibration.ids[joint]} ({JOINTS[joint]})",
+            text=f"its joint reads {math.degrees(angles[joint]):.0f}°, outside its limits "
+            f"({math.degrees(lower[joint]):.0f}..{math.degrees(upper[joint]):.0f}°)",
+            mend="Move the leg by hand, or calibrate anew: bluefoot servo calibrate",
+            severity=Severity.REFUSAL,
+        )
+        for joint in np.flatnonzero(beyond > _SAG).tolist()
+    )
 
 
 def _identities(devices: Devices) -> dict[int, tuple[int, int]]:
