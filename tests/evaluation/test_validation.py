@@ -1,6 +1,7 @@
 """Running a validation: what is run, what is kept, what a stop leaves."""
 
 import multiprocessing
+import time
 
 import pytest
 
@@ -134,4 +135,8 @@ def test_processes_side_by_side_are_gone_when_nobody_wants_them(tmp_path):
     _, seed, figures = next(runs)
     assert figures == module.measure_validation(case, seed)
     runs.close()
+    # A process that was told to go takes a moment on a busy machine.
+    end = time.monotonic() + 20.0
+    while set(multiprocessing.active_children()) != before and time.monotonic() < end:
+        time.sleep(0.05)
     assert set(multiprocessing.active_children()) == before
