@@ -26,6 +26,7 @@ from bluefoot_mpc.io.board.messages import (
 )
 from bluefoot_mpc.io.emulation.board_parts import BoardFaults, BoardSource, BoardTimes
 from bluefoot_mpc.io.emulation.board_supply import SupplySwitch
+from bluefoot_mpc.io.emulation.outbox import arrived
 from bluefoot_mpc.types import N_LEGS, FloatArray
 
 __all__ = ["BoardFaults", "BoardSource", "BoardTimes", "EmulatedBoard"]
@@ -94,19 +95,7 @@ class EmulatedBoard:
     def transmit(self, time: float) -> bytes:
         """Every byte that has arrived at the host by `time` (s) and was not handed out before."""
         self.advance(time)
-        byte = 10.0 / self._times.baud
-        found = bytearray()
-        while self._out:
-            begin, data = self._out[0]
-            count = min(len(data), math.floor((time - begin) / byte + 1e-6))
-            if count <= 0:
-                break
-            found += data[:count]
-            self._out.popleft()
-            if count < len(data):
-                self._out.appendleft((begin + count * byte, data[count:]))
-                break
-        return bytes(found)
+        return arrived(self._out, time, 10.0 / self._times.baud)
 
     # -- time ------------------------------------------------------------------------
 

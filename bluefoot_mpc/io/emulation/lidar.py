@@ -25,6 +25,7 @@ from bluefoot_mpc.io.emulation.lidar_replies import (
     scan_body,
     time_line,
 )
+from bluefoot_mpc.io.emulation.outbox import arrived
 from bluefoot_mpc.io.lidar.geometry import SCAN_PERIOD, SWEEP_END
 from bluefoot_mpc.settings import require_finite, require_nonnegative, require_positive
 
@@ -106,19 +107,7 @@ class EmulatedLidar:
     def transmit(self, time: float) -> bytes:
         """Every byte that has arrived at the host by `time` (s) and was not handed out before."""
         self._advance(time)
-        byte = self._times.byte_time
-        found = bytearray()
-        while self._out:
-            begin, data = self._out[0]
-            count = min(len(data), math.floor((time - begin) / byte + 1e-6))
-            if count <= 0:
-                break
-            found += data[:count]
-            self._out.popleft()
-            if count < len(data):
-                self._out.appendleft((begin + count * byte, data[count:]))
-                break
-        return bytes(found)
+        return arrived(self._out, time, self._times.byte_time)
 
     # -- time --------------------------------------------------------------------------
 
