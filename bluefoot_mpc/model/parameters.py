@@ -176,11 +176,19 @@ class BatteryParameters:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SensorMounts:
-    """Mounting points in the base frame, m."""
+    """Where the sensors are, in the base frame; LIDAR and camera look along x."""
 
-    imu: tuple[float, float, float]
-    lidar: tuple[float, float, float]
-    camera: tuple[float, float, float]
+    imu: tuple[float, float, float]  # m
+    lidar: tuple[float, float, float]  # m
+    camera: tuple[float, float, float]  # m
+    camera_view_deg: float = 63.0  # degrees, from the left edge of a picture to its right edge
+
+    def __post_init__(self) -> None:
+        require_range(10.0, 150.0, camera_view_deg=self.camera_view_deg)
+
+    def focal_length(self, width: int) -> float:
+        """Focal length in pixels of pictures that are `width` pixels wide."""
+        return 0.5 * width / math.tan(0.5 * math.radians(self.camera_view_deg))
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -1,0 +1,1 @@
+"""Wheeled robots and legs on paper: constraints, mobility, ready robots, balance, gait diagrams."""
