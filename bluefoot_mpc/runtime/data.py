@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.runtime.pictures import PictureBook
 from bluefoot_mpc.runtime.versions import installed_versions
 from bluefoot_mpc.types import (
     FloatArray,
@@ -82,6 +83,7 @@ class RunData:
         stop_reason: one sentence; ``"completed"`` when the run reached its end.
         real_time_factor: simulated time over wall time; None where unknown.
         versions: of this package and what it ran on.
+        pictures: the few of the camera's that are kept; ``frames`` need not hold any.
     """
 
     frames: list[SensorFrame] = field(default_factory=list)
@@ -93,6 +95,16 @@ class RunData:
     stop_reason: str = COMPLETED
     real_time_factor: float | None = None
     versions: dict[str, str] = field(default_factory=installed_versions)
+    pictures: PictureBook = field(default_factory=PictureBook, repr=False, compare=False)
+
+    def keep_picture(self, frame: SensorFrame, telemetry: Telemetry) -> None:
+        """Keep a tick's picture where it is worth it; to be called on every tick, with a picture or without.
+
+        Args:
+            frame: the tick's frame, its picture included.
+            telemetry: what the controller made of it.
+        """
+        self.pictures.keep(frame, telemetry)
 
     def records(self, topic: str) -> list[Any]:
         """The list of records of a topic, with or without its leading slash.
