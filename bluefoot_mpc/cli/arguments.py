@@ -123,6 +123,10 @@ class RunCommand(RobotArguments):
     """Push: direction from forward, degrees, left positive."""
     push_time: Annotated[float | None, _Unset] = None
     """Push: time after the start, s."""
+    leader: Annotated[
+        str | None, tyro.conf.arg(metavar="KIND", help_behavior_hint="(default: differential)")
+    ] = None
+    """Follow: kind of wheeled robot that leads, e.g. ackermann, mecanum, balancing."""
     level: Annotated[
         str | None,
         tyro.conf.arg(metavar="{none,pd,narx}", help_behavior_hint="(default: none; level: narx)"),
@@ -135,7 +139,7 @@ class RunCommand(RobotArguments):
     def run_fields(self) -> dict[str, Any]:
         """Arguments by the names that RunOptions gives them."""
         names = ["duration", "view", "speed", "lateral_speed"]
-        names += ["yaw_rate", "impulse", "direction", "push_time", "level", "level_mix"]
+        names += ["yaw_rate", "impulse", "direction", "push_time", "leader", "level", "level_mix"]
         return {**super().run_fields(), **{name: getattr(self, name) for name in names}}
 
 

@@ -7,14 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from bluefoot_mpc.types import MotionCommand
+from bluefoot_mpc.types import Guide, MotionCommand
 
 
 def usable(motion: MotionCommand, previous: MotionCommand) -> tuple[MotionCommand, tuple[str, ...]]:
     """The command with what is not finite replaced, and what a person should know of that.
 
     A speed that is not a number is no speed: the robot comes to rest. A trunk
-    offset that is none leaves the trunk where it was told to be before.
+    offset that is none leaves the trunk where it was told to be before. A guided
+    task with such a number is none, and the robot comes to rest.
 
     Args:
         motion: the command as it came.
@@ -28,6 +29,9 @@ def usable(motion: MotionCommand, previous: MotionCommand) -> tuple[MotionComman
     if not posed:
         motion = replace(motion, trunk=previous.trunk)
         events = (*events, "trunk command is not finite: the last one is kept")
+    if motion.guide is not None and not _is_finite_guide(motion.guide):
+        motion = replace(motion, velocity=np.zeros(2), yaw_rate=0.0, guide=None)
+        events = (*events, "the guided task's numbers are not finite: the robot stands")
     return motion, events
 
 
@@ -37,3 +41,7 @@ def _has_finite_twist(motion: MotionCommand) -> bool:
 
 def _has_finite_pose(motion: MotionCommand) -> bool:
     return math.isfinite(sum(motion.trunk.position.tolist()) + sum(motion.trunk.rpy.tolist()))
+
+
+def _is_finite_guide(guide: Guide) -> bool:
+    return math.isfinite(guide.speed + guide.distance) and bool(np.isfinite(guide.waypoints).all())

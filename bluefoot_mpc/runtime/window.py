@@ -12,7 +12,7 @@ import numpy as np
 
 from bluefoot_mpc.runtime import metrics
 from bluefoot_mpc.runtime.data import CommandRecord, RunData
-from bluefoot_mpc.types import BoolArray, FloatArray, Mode, MotionCommand, Telemetry, TruthSample
+from bluefoot_mpc.types import BoolArray, FloatArray, Guide, Mode, MotionCommand, Telemetry, TruthSample
 
 SETTLING = 2.0
 """s after the last change of command before measuring starts."""
@@ -53,7 +53,15 @@ def same_motion(a: MotionCommand, b: MotionCommand) -> bool:
         and np.array_equal(a.velocity, b.velocity)
         and np.array_equal(a.trunk.position, b.trunk.position)
         and np.array_equal(a.trunk.rpy, b.trunk.rpy)
+        and _same_task(a.guide, b.guide)
     )
+
+
+def _same_task(a: Guide | None, b: Guide | None) -> bool:
+    if a is None or b is None:
+        return a is b
+    same = (a.task, a.speed, a.distance) == (b.task, b.speed, b.distance)
+    return same and np.array_equal(a.waypoints, b.waypoints)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -125,7 +133,7 @@ def cut_window(run: RunData, start: float, end: float) -> Window | None:
         position=q[:, :3],
         quaternion=q[:, 3:7],
         estimated_quaternion=_stack(telemetry, lambda t: t.estimate.quaternion),
-        wanted_roll_pitch=_stack(commands, lambda c: c.motion.trunk.rpy[:2]),
+        wanted_roll_pitch=np.array(list(map(_wanted_roll_pitch, commands, telemetry))),
         heading=_commanded_heading(run.telemetry[:ticks], run.truth[0], time)[span],
         direction=_direction(commands[-1]),
         yaw_rate_wanted=float(commands[-1].motion.yaw_rate),
@@ -137,6 +145,12 @@ def cut_window(run: RunData, start: float, end: float) -> Window | None:
         reference_foot=_stack(telemetry, lambda t: t.reference.foot_position),
         reference_swing=np.array([t.reference.swing for t in telemetry], dtype=np.bool_),
     )
+
+
+def _wanted_roll_pitch(command: CommandRecord, telemetry: Telemetry) -> FloatArray:
+    """(2,) rad, as commanded, by navigation where it leads."""
+    motion = command.motion if command.motion.guide is None else telemetry.motion
+    return motion.trunk.rpy[:2]
 
 
 def _stack(records: Sequence[Any], get: Any) -> FloatArray:

@@ -62,6 +62,7 @@ class Scenario(ABC):
         name: what it is called on the command line.
         Config: its configuration.
         default_controller: what decides where nobody chooses.
+        default_world: where it runs where nobody chooses.
         config: the configuration in force.
         world: the world that it runs in, for criteria that depend on the ground.
     """
@@ -69,6 +70,7 @@ class Scenario(ABC):
     name: ClassVar[str]
     Config: ClassVar[type[ScenarioConfig]] = ScenarioConfig
     default_controller: ClassVar[str] = DEFAULT_CONTROLLER
+    default_world: ClassVar[str] = "flat"
 
     config: Any
     world: WorldConfig = WorldConfig()
@@ -109,6 +111,11 @@ class Scenario(ABC):
     def figures(self, run: RunData) -> Mapping[str, Any]:
         """Figures of its own for the summary, by name; by default none."""
         return {}
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Sensors without which it cannot be done: ``"lidar"``, ``"camera"``; by default none."""
+        return ()
 
     @property
     def scripted(self) -> bool:

@@ -22,6 +22,7 @@ from bluefoot_mpc.sim.config import SimConfig
 SCENARIO_OPTIONS = {
     "duration": "duration", "gait": "gait", "speed": "speed", "lateral_speed": "lateral_speed",
     "yaw_rate": "yaw_rate", "impulse": "impulse", "direction": "direction", "push_time": "push_time",
+    "leader": "leader",
 }  # fmt: skip
 """Options that fill a field of the scenario's configuration, where it has that field."""
 
@@ -99,12 +100,13 @@ def resolve(scenario: type[Scenario], options: RunOptions) -> Resolved:
     scenario_table = merge(table.get("scenario", {}), _scenario_options(scenario, options))
     made = scenario(build(scenario.Config, scenario_table, "scenario"))
     control = merge(to_table(preset(controller, parameters)), _own_control(made, controller))
-    table = merge({"control": control}, table)
+    table = merge(merge({"control": control}, _surroundings(made)), table)
     table = merge(table, _level_options(table, options))
     table = merge(table, _device_options(options))
     stages = build(StageConfig, {key: table[key] for key in stage_names if key in table})
     sim = build(SimConfig, merge(to_table(stages.sim), _sim_options(options)), "sim")
     made.world = sim.world
+    _require_sensors(made, stages.devices, options.robot)
     return Resolved(
         run=RunSection(scenario=scenario.name, seed=options.seed, robot=options.robot, controller=controller),
         scenario=made,
@@ -146,6 +148,25 @@ def _own_control(scenario: Scenario, controller: str) -> Mapping[str, Any]:
             f"{{}} for nothing, not {changes!r}"
         )
     return changes
+
+
+def _surroundings(scenario: Scenario) -> dict[str, Any]:
+    """The world that a scenario runs in where nobody chooses, and the sensors that it needs."""
+    sensors = {name: {"enabled": True} for name in scenario.needs}
+    table: dict[str, Any] = {"sim": {"world": {"name": scenario.default_world}, **sensors}}
+    return table | {"devices": {"emulate_lidar": True}} if "lidar" in scenario.needs else table
+
+
+def _require_sensors(scenario: Scenario, devices: DevicesConfig, robot: str) -> None:
+    """A real robot has the sensors that the scenario needs, or is told of them."""
+    ports = {"lidar": ("lidar_port", devices.lidar_port), "camera": ("camera", devices.camera)}
+    for sensor in scenario.needs if robot == "hardware" else ():
+        key, port = ports[sensor]
+        if not port:
+            raise ConfigurationError(
+                f"scenario '{scenario.name}' needs a {sensor}: say where it is, "
+                f"--set devices.{key}={'/dev/ttyACM0' if sensor == 'lidar' else '0'}"
+            )
 
 
 def _without_run(table: dict[str, Any]) -> dict[str, Any]:

@@ -57,6 +57,7 @@ class RunOptions:
     impulse: float | None = None  # N·s
     direction: float | None = None  # degrees from forward, left positive
     push_time: float | None = None  # s
+    leader: str | None = None  # kind of a wheeled robot, see bluefoot_mpc.wheels.ready
     level: str | None = None  # trunk levelling, one of LEVELS
     level_mix: float | None = None  # share of the levelling goals, between 0 and 1
 

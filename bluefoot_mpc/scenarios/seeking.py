@@ -1,0 +1,143 @@
+"""Scenarios with a marker: finding it behind obstacles, and following a leader that carries it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.runtime.data import RunData
+from bluefoot_mpc.scenarios import way_figures
+from bluefoot_mpc.scenarios.base import NOT_MEASURED, Criterion, not_fallen
+from bluefoot_mpc.scenarios.navigating import GuidedConfig, GuidedScenario, nearness_criteria, stuck_criterion
+from bluefoot_mpc.settings import require_range
+from bluefoot_mpc.sim.config import SimConfig
+from bluefoot_mpc.types import Guide, GuideTask
+from bluefoot_mpc.wheels.ready import READY
+
+DISTANCE_TOLERANCE = 0.05
+"""m, of the wanted distance, that the robot may stop from it."""
+MIN_IN_VIEW = 90.0
+"""Percent of the time that the leader has to be in view."""
+MAX_LEADER_SPEED = 0.15
+"""m/s; a leader any faster leaves the robot behind on its curves."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SeekConfig(GuidedConfig):
+    """A marker to look for and to keep a distance from."""
+
+    distance: float = 0.6  # m, horizontal, from the camera to the marker's centre
+
+    def __post_init__(self) -> None:
+        GuidedConfig.__post_init__(self)
+        require_range(0.4, 2.0, distance=self.distance)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ApproachConfig(SeekConfig):
+    """A marker that stands somewhere."""
+
+    duration: float = 120.0  # s
+
+
+class Approach(GuidedScenario):
+    """Find a marker behind obstacles, walk up to it and stop."""
+
+    name = "approach"
+    Config = ApproachConfig
+    config: ApproachConfig
+    default_world = "hidden"
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """LIDAR and camera."""
+        return ("lidar", "camera")
+
+    def guide(self) -> Guide:
+        """Approach."""
+        return Guide(task=GuideTask.APPROACH, speed=self.config.speed, distance=self.config.distance)
+
+    def figures(self, run: RunData) -> Mapping[str, Any]:
+        """When it saw the marker, where it stopped, and how near it came to things."""
+        return {
+            **way_figures.nearness(run),
+            **way_figures.movement(run),
+            **way_figures.distance_figures(run, self.config.distance),
+            "first_seen_s": way_figures.first_sight(run),
+            "arrived_s": way_figures.arrival(run),
+        }
+
+    def criteria(self, summary: Mapping[str, Any]) -> list[Criterion]:
+        """On its feet, nothing touched, and stopped at the wanted distance."""
+        error, arrived = summary["figures"]["distance_error_m"], summary["figures"]["arrived_s"]
+        stopped = Criterion(
+            name=f"stopped within {DISTANCE_TOLERANCE:g} m of the wanted distance",
+            holds=arrived is not None and error is not None and abs(error) <= DISTANCE_TOLERANCE,
+            detail=NOT_MEASURED if error is None else f"{error:+.3f} m",
+        )
+        found = [not_fallen(summary), *nearness_criteria(summary), stuck_criterion(summary)]
+        return [*found, stopped]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class FollowConfig(SeekConfig):
+    """A wheeled leader that carries the marker."""
+
+    duration: float = 120.0  # s
+    leader: str = "differential"  # which of the ready wheeled robots
+    leader_speed: float = 0.10  # m/s
+    leader_path: str = "figure_of_eight"  # see sim.leader.path
+
+    def __post_init__(self) -> None:
+        SeekConfig.__post_init__(self)
+        if self.leader not in READY:
+            raise UnknownNameError("leader", self.leader, READY)
+        if not 0.0 <= self.leader_speed <= MAX_LEADER_SPEED:
+            raise ConfigurationError(
+                f"leader_speed = {self.leader_speed:g} m/s must lie in 0..{MAX_LEADER_SPEED:g}"
+            )
+
+
+class Follow(GuidedScenario):
+    """Follow a wheeled leader that carries a marker (--leader differential, mecanum, balancing ...)."""
+
+    name = "follow"
+    Config = FollowConfig
+    config: FollowConfig
+    default_world = "arena"
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """LIDAR and camera."""
+        return ("lidar", "camera")
+
+    def guide(self) -> Guide:
+        """Follow."""
+        return Guide(task=GuideTask.FOLLOW, speed=self.config.speed, distance=self.config.distance)
+
+    def prepare(self, sim: SimConfig) -> SimConfig:
+        """Put the leader into the world."""
+        config = self.config
+        leader = replace(sim.leader, kind=config.leader, speed=config.leader_speed, path=config.leader_path)
+        return replace(sim, leader=leader)
+
+    def figures(self, run: RunData) -> Mapping[str, Any]:
+        """How long the leader was in view, at what distance, and how near it came to things."""
+        return {
+            **way_figures.nearness(run),
+            **way_figures.movement(run),
+            **way_figures.distance_figures(run, self.config.distance),
+            "in_view_percent": way_figures.in_view_percent(run),
+        }
+
+    def criteria(self, summary: Mapping[str, Any]) -> list[Criterion]:
+        """On its feet, nothing touched, the leader in view."""
+        seen = summary["figures"]["in_view_percent"]
+        view = Criterion(
+            name=f"leader in view for at least {MIN_IN_VIEW:g} % of the time",
+            holds=seen is not None and seen >= MIN_IN_VIEW,
+            detail=NOT_MEASURED if seen is None else f"{seen:.1f} %",
+        )
+        return [not_fallen(summary), *nearness_criteria(summary), view]
