@@ -18,6 +18,8 @@ from bluefoot_mpc.sim.servo import BankConfig, Plant, ServoBank
 from bluefoot_mpc.sim.terrain import Ground
 from bluefoot_mpc.sim.truth import TruthReader
 from bluefoot_mpc.sim.world import World, build_world
+from bluefoot_mpc.sim.worlds.make import world_plan
+from bluefoot_mpc.sim.worlds.plan import WorldPlan
 from bluefoot_mpc.types import N_JOINTS, FloatArray, SensorFrame, TruthSample
 
 _SENSORS_OFF = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
@@ -57,7 +59,8 @@ class SimBody:
         drawn = draw(config, seed)
         self.drawn = drawn.as_dict()
         self._latency = round(drawn.latency / config.physics_period)
-        self._world = build_world(robot, config, drawn)
+        self._plan = world_plan(config.world, seed)
+        self._world = build_world(robot, config, drawn, self._plan)
         self._steps = round(period / config.physics_period)
         self._imu_steps = round(config.sensors.imu_period / config.physics_period)
         self._bank = ServoBank(
@@ -106,6 +109,11 @@ class SimBody:
     def data(self) -> mujoco.MjData:
         """MuJoCo's state, for viewers. Do not write to it."""
         return self._world.data
+
+    @property
+    def plan(self) -> WorldPlan | None:
+        """What stands where in the world; None on open ground and in MuJoCo's own files."""
+        return self._plan
 
     @property
     def ground(self) -> Ground:

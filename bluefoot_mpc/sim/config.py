@@ -10,7 +10,13 @@ from typing import Literal
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.settings import require_finite, require_nonnegative, require_positive, require_range
 
-WORLDS = ("flat", "rough", "slope", "steps")
+OPEN_WORLDS = ("flat", "rough", "slope", "steps")
+"""Names of the worlds that are nothing but ground."""
+
+PLANNED_WORLDS = ("room", "corridors", "chairs", "maze", "dead_ends", "hidden", "arena")
+"""Names of the worlds in which things stand; the seed decides where."""
+
+WORLDS = (*OPEN_WORLDS, *PLANNED_WORLDS)
 """Names of the worlds that ship."""
 
 DEFAULT_SLOPE_DEG = 5.0
@@ -21,7 +27,8 @@ DEFAULT_SLOPE_DEG = 5.0
 class WorldConfig:
     """The ground and what the robot carries over it."""
 
-    name: str = "flat"  # flat, slope, steps, rough, or the path of an MJCF file
+    name: str = "flat"  # one of WORLDS, or the path of a plan (.toml) or of an MJCF file
+    layout_seed: int = -1  # of where things stand; -1 takes the run's seed
     friction: float = 0.8  # Coulomb, feet on the ground
     slope_deg: float = 0.0  # degrees, positive climbs along +x; tilts the whole world
     step_height: float = 0.01  # m, each step of the world "steps"
@@ -37,9 +44,14 @@ class WorldConfig:
         if self.name not in WORLDS and not Path(self.name).is_file():
             if Path(self.name).suffix or "/" in self.name:
                 raise ConfigurationError(
-                    f"no world file '{self.name}': give an MJCF file, or one of: {', '.join(WORLDS)}"
+                    f"no world file '{self.name}': give a plan (.toml), an MJCF file, or one of:"
+                    f" {', '.join(WORLDS)}"
                 )
             raise UnknownNameError("world", self.name, WORLDS)
+        if self.layout_seed < -1:
+            raise ConfigurationError(
+                f"layout_seed = {self.layout_seed} must not be negative, but -1, which takes the run's seed"
+            )
         require_nonnegative(friction=self.friction, payload=self.payload[0], rough_seed=self.rough_seed)
         require_range(-45.0, 45.0, slope_deg=self.slope_deg)
         require_positive(
@@ -47,6 +59,16 @@ class WorldConfig:
             rough_height=self.rough_height, rough_wavelength=self.rough_wavelength,
         )  # fmt: skip
         require_finite(payload=self.payload, step_start=self.step_start)
+        if self.is_planned and self.slope_deg != 0.0:
+            raise ConfigurationError(
+                f"the world '{self.name}' is level: leave slope_deg = {self.slope_deg:g} out,"
+                f" or take one of: {', '.join(OPEN_WORLDS)}"
+            )
+
+    @property
+    def is_planned(self) -> bool:
+        """True where things stand on level floor as a plan says: from a seed, or from a file."""
+        return self.name in PLANNED_WORLDS or self.name.endswith(".toml")
 
     @property
     def slope(self) -> float:

@@ -61,7 +61,7 @@ class Ground:
 
     def __init__(self, config: WorldConfig, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         self._model, self._data = model, data
-        self.is_plane = config.name in {"flat", "slope"}
+        self.is_plane = config.name in {"flat", "slope"} or config.is_planned
         self._tilt = math.tan(config.slope)
         self._cosine = math.cos(config.slope)
         self._hit = np.zeros(1, dtype=np.int32)

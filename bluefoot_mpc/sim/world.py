@@ -11,9 +11,11 @@ import mujoco
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.model.parameters import GRAVITY, RobotParameters
 from bluefoot_mpc.model.robot import RobotModel
-from bluefoot_mpc.sim.config import WORLDS, SensorConfig, SimConfig, WorldConfig
+from bluefoot_mpc.sim.config import OPEN_WORLDS, SensorConfig, SimConfig, WorldConfig
 from bluefoot_mpc.sim.randomization import Draw
 from bluefoot_mpc.sim.terrain import add_ground
+from bluefoot_mpc.sim.worlds.build import FLOOR_GROUP, THING_GROUP, add_plan
+from bluefoot_mpc.sim.worlds.plan import WorldPlan
 from bluefoot_mpc.types import JOINTS, LEGS
 
 FOOT_SOLREF = (0.004, 1.0)
@@ -56,8 +58,14 @@ class World:
     sensor: int
 
 
-def build_world(robot: RobotModel, config: SimConfig, draw: Draw) -> World:
+def build_world(robot: RobotModel, config: SimConfig, draw: Draw, plan: WorldPlan | None = None) -> World:
     """Compile robot and world, with what was drawn for this run.
+
+    Args:
+        robot: its model.
+        config: the simulation.
+        draw: what is different in this run.
+        plan: what stands in the world, where the configuration names a planned one.
 
     Raises:
         ConfigurationError: the world's file is not an MJCF model that the robot can stand in.
@@ -65,7 +73,7 @@ def build_world(robot: RobotModel, config: SimConfig, draw: Draw) -> World:
     spec = _robot_spec(robot, config, draw)
     _set_options(spec, config)
     try:
-        _add_world(spec, config.world)
+        _add_world(spec, config.world, plan)
         model = spec.compile()
     except ValueError as error:
         raise ConfigurationError(f"world '{config.world.name}': {error}") from error
@@ -74,16 +82,22 @@ def build_world(robot: RobotModel, config: SimConfig, draw: Draw) -> World:
     return _locate(model, data)
 
 
-def _add_world(spec: mujoco.MjSpec, config: WorldConfig) -> None:
-    if config.name in WORLDS:
+def _add_world(spec: mujoco.MjSpec, config: WorldConfig, plan: WorldPlan | None) -> None:
+    if config.name in OPEN_WORLDS or plan is not None:
         spec.worldbody.add_light(
             pos=[0.0, 0.0, 4.0], dir=[0.2, 0.1, -1.0], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         )
         add_ground(spec, config)
+        if plan is not None:
+            add_plan(spec, plan)
         return
     half = -0.5 * config.slope
     frame = spec.worldbody.add_frame(quat=[math.cos(half), 0.0, math.sin(half), 0.0])
-    spec.attach(mujoco.MjSpec.from_file(str(Path(config.name).resolve())), frame=frame, prefix="world_")
+    world = mujoco.MjSpec.from_file(str(Path(config.name).resolve()))
+    ground = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+    for geom in world.geoms:
+        geom.group = FLOOR_GROUP if geom.type in ground else THING_GROUP
+    spec.attach(world, frame=frame, prefix="world_")
 
 
 def _set_options(spec: mujoco.MjSpec, config: SimConfig) -> None:

@@ -1,0 +1,36 @@
+"""World plans from their names and a seed, or from files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from bluefoot_mpc.sim.config import PLANNED_WORLDS, WorldConfig
+from bluefoot_mpc.sim.randomization import stream
+from bluefoot_mpc.sim.worlds.layout import Layout
+from bluefoot_mpc.sim.worlds.plan import WorldPlan
+from bluefoot_mpc.sim.worlds.rooms import arena, room
+
+KINDS: Mapping[str, Callable[[np.random.Generator], Layout]] = {"room": room, "arena": arena}
+"""What makes the layout of each kind of world."""
+
+
+def world_plan(config: WorldConfig, seed: int) -> WorldPlan | None:
+    """The plan of a configured world; None for open ground and for MuJoCo's own files.
+
+    Args:
+        config: of the world; its layout's seed goes before the run's.
+        seed: of the run.
+
+    Raises:
+        ConfigurationError: the world's file is not a plan that the robot can stand in.
+    """
+    if config.name in PLANNED_WORLDS:
+        return make_plan(config.name, seed if config.layout_seed < 0 else config.layout_seed)
+    return None
+
+
+def make_plan(kind: str, seed: int) -> WorldPlan:
+    """A world of a kind; the same kind and seed give the same world."""
+    return KINDS[kind](stream(seed, f"world.{kind}")).plan(kind, seed)

@@ -1,0 +1,143 @@
+"""Worlds of one room: cylinders to walk around, and the arena in which a leader is followed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bluefoot_mpc.sim.worlds.layout import PASSAGE, WALL, Bounds, Colour, Layout, box, cylinder, pick
+from bluefoot_mpc.sim.worlds.plan import Solid
+
+NEAR_MARKER: Colour = (0.80, 0.22, 0.52)
+"""Colour of the arena's misleading wall: the marker's hue, a little paler."""
+
+ARENA_FREE: Bounds = (-1.0, -1.9, 4.4, 1.9)
+"""m, least x, least y, greatest x, greatest y: nothing stands here in the arena, whatever the seed."""
+
+_TRIES = 200
+
+
+def room(rng: np.random.Generator) -> Layout:
+    """A rectangular room with upright cylinders and up to two stubs of wall."""
+    layout = Layout(some_bounds(rng, (5.6, 7.4), (4.6, 6.0)))
+    layout.enclose()
+    for _ in range(int(rng.integers(0, 3))):
+        add_stub(layout, rng)
+    for _ in range(int(rng.integers(5, 9))):
+        add_cylinder(layout, rng)
+    return layout
+
+
+def arena(rng: np.random.Generator) -> Layout:
+    """A big room, free in the middle, things along its walls, one wall nearly of the marker's colour."""
+    x0, y0, x1, y1 = ARENA_FREE
+    room_left, room_ahead = rng.uniform(0.9, 1.2), rng.uniform(0.9, 1.2)
+    side = rng.uniform(0.9, 1.2, 2)
+    layout = Layout(_rounded((x0 - room_left, y0 - side[0], x1 + room_ahead, y1 + side[1])))
+    colours = [WALL] * 4
+    colours[int(rng.integers(4))] = NEAR_MARKER
+    layout.enclose(colours)
+    for _ in range(int(rng.integers(5, 8))):
+        _add_along_wall(layout, rng)
+    return layout
+
+
+def some_bounds(rng: np.random.Generator, length: tuple[float, float], width: tuple[float, float]) -> Bounds:
+    """A rectangle with the origin somewhere inside, at least 1.1 m from its sides; either way round."""
+    sizes = [rng.uniform(*length), rng.uniform(*width)]
+    if rng.random() < 0.5:
+        sizes.reverse()
+    low = [-rng.uniform(1.1, size - 1.1) for size in sizes]
+    return _rounded((low[0], low[1], low[0] + sizes[0], low[1] + sizes[1]))
+
+
+def random_point(layout: Layout, rng: np.random.Generator, margin: float) -> tuple[float, float]:
+    """A point within the bounds, m in world.
+
+    Args:
+        layout: whose bounds count.
+        rng: to draw from.
+        margin: m, least distance from the bounds.
+    """
+    x0, y0, x1, y1 = layout.bounds
+    return float(rng.uniform(x0 + margin, x1 - margin)), float(rng.uniform(y0 + margin, y1 - margin))
+
+
+def add_cylinder(layout: Layout, rng: np.random.Generator) -> bool:
+    """Put a cylinder where there is room for it; False where none was found."""
+    radius = float(rng.choice([0.05, 0.08, 0.12, 0.18, 0.25]))
+    name, colour, height = layout.name("cylinder"), pick(rng), float(rng.uniform(0.4, 0.6))
+    for _ in range(_TRIES):
+        thing = cylinder(name, random_point(layout, rng, radius + PASSAGE), radius, height, colour)
+        if layout.has_room([thing]):
+            layout.add(thing)
+            return True
+    return False
+
+
+def add_stub(layout: Layout, rng: np.random.Generator) -> bool:
+    """Put a short wall that begins at an outer wall; False where there was no room for it."""
+    x0, y0, x1, y1 = layout.bounds
+    for _ in range(_TRIES):
+        length = float(rng.uniform(0.8, 1.4))
+        x, y = random_point(layout, rng, PASSAGE + 0.1)
+        start, end = (
+            ((x, y1), (x, y1 - length)),
+            ((x, y0), (x, y0 + length)),
+            ((x0, y), (x0 + length, y)),
+            ((x1, y), (x1 - length, y)),
+        )[int(rng.integers(4))]
+        trial = Layout(layout.bounds)
+        stub = trial.partition(start, end)
+        others = [solid for solid in layout.solids if not solid.name.startswith("wall")]
+        free = Layout(layout.bounds)
+        free.add(*others)
+        if free.has_room([stub]) and _end_has_room(layout, end):
+            layout.partition(start, end)
+            return True
+    return False
+
+
+def _end_has_room(layout: Layout, end: tuple[float, float]) -> bool:
+    """True where the end of a wall is a passage away from at least three outer walls, and its own."""
+    x0, y0, x1, y1 = layout.bounds
+    near = [gap < PASSAGE + 0.1 for gap in (end[0] - x0, x1 - end[0], end[1] - y0, y1 - end[1])]
+    return sum(near) <= 1
+
+
+def _add_along_wall(layout: Layout, rng: np.random.Generator) -> bool:
+    """Put a cylinder or a box against an outer wall; False where there was no room for it."""
+    x0, y0, x1, y1 = layout.bounds
+    kind = "cylinder" if rng.random() < 0.5 else "box"
+    name, colour = layout.name(kind), pick(rng)
+    for _ in range(_TRIES):
+        half = float(rng.uniform(0.10, 0.30))
+        # Some touch the wall, some leave a gap that is clearly too narrow.
+        inset = half + float(rng.choice([0.02, 0.15]))
+        x, y = random_point(layout, rng, inset)
+        at = ((x1 - inset, y), (x, y1 - inset), (x0 + inset, y), (x, y0 + inset))[int(rng.integers(4))]
+        height = float(rng.uniform(0.35, 0.6))
+        thing = (
+            cylinder(name, at, half, height, colour)
+            if kind == "cylinder"
+            else box(name, at, (2.0 * half, 2.0 * half, height), 0.0, colour)
+        )
+        things = Layout(layout.bounds)
+        things.add(*(solid for solid in layout.solids if not solid.name.startswith("wall")))
+        if things.has_room([thing]) and _outside(thing, ARENA_FREE):
+            layout.add(thing)
+            return True
+    return False
+
+
+def _outside(thing: Solid, bounds: Bounds) -> bool:
+    reach = 0.5 * math.hypot(*thing.size[:2]) if thing.shape == "box" else 0.5 * thing.size[0]
+    x0, y0, x1, y1 = bounds
+    away = np.hypot(max(x0 - thing.x, 0.0, thing.x - x1), max(y0 - thing.y, 0.0, thing.y - y1))
+    return bool(away >= reach)
+
+
+def _rounded(bounds: Bounds) -> Bounds:
+    x0, y0, x1, y1 = (round(float(value), 3) for value in bounds)
+    return x0, y0, x1, y1
