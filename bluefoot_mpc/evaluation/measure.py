@@ -10,6 +10,7 @@ import numpy as np
 
 from bluefoot_mpc.evaluation.cases import Case
 from bluefoot_mpc.evaluation.level_measure import leveling_figures
+from bluefoot_mpc.evaluation.way_measure import way_figures
 from bluefoot_mpc.runtime import metrics
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.runtime.summary import summarize
@@ -66,6 +67,7 @@ def measure(case: Case, seed: int) -> Figures:
         "tick_us": (summary["tick_us"] or {}).get("p50"),
         "cost_of_transport": summary["cost_of_transport"],
         **_lags(summary["figures"]),
+        **way_figures(summary["figures"]),
         **leveling_figures(summary["figures"]),
     }
 

@@ -246,7 +246,8 @@ def _record(
     output: ControlOutput,
 ) -> None:
     truth = hooks.truth() if hooks.truth is not None else None
-    # Pictures are in the log; an hour of them would not fit into memory.
+    # Pictures are in the log, a few of them kept; an hour of them would not fit into memory.
+    data.keep_picture(frame, output.telemetry)
     data.frames.append(frame if frame.camera is None else replace(frame, camera=None))
     data.commands.append(CommandRecord(time=frame.time, motion=motion, safety=safety, joints=output.command))
     data.telemetry.append(output.telemetry)
