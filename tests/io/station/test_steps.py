@@ -46,7 +46,7 @@ def test_text_is_read_from_an_option_or_a_file(tmp_path, as_file):
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("jump 2", "unknown step 'jump'.*Valid: pose, sit, stand, turn, walk"),
+        ("jump 2", "unknown step 'jump'.*Valid: approach, follow, goto, pose, sit, stand, turn, walk, wander"),
         ("walk", "it has the form: walk SECONDS forward=NUMBER"),
         ("walk five", "cannot read the step 'walk five'"),
         ("walk 5 speed=2", "unknown value of 'walk' 'speed'.*forward"),
