@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from bluefoot_mpc.control.command import usable
-from bluefoot_mpc.types import Mode, MotionCommand, TrunkPose
+from bluefoot_mpc.types import Guide, GuideTask, Mode, MotionCommand, TrunkPose
 
 GOOD = MotionCommand(
     mode=Mode.WALK, velocity=np.array([0.05, 0.01]), yaw_rate=0.1, gait="walk",
@@ -35,3 +35,19 @@ def test_a_bad_pose_is_the_last_good_one(field):
     np.testing.assert_array_equal(motion.velocity, GOOD.velocity)
     assert len(events) == 1
     assert "trunk" in events[0]
+
+
+@pytest.mark.parametrize("field", ["speed", "distance", "waypoints"])
+def test_a_task_that_is_not_finite_is_none_and_the_robot_rests(field):
+    bad = np.array([[1.0, 0.0], [np.nan, 0.0]]) if field == "waypoints" else np.inf
+    guide = Guide(task=GuideTask.GOTO, **{field: bad})
+    motion, events = usable(MotionCommand(mode=Mode.WALK, velocity=GOOD.velocity, guide=guide), GOOD)
+    assert motion.guide is None
+    np.testing.assert_array_equal(motion.velocity, 0.0)
+    assert len(events) == 1
+    assert "guided task" in events[0]
+
+
+def test_a_good_task_goes_through():
+    motion = MotionCommand(mode=Mode.WALK, guide=Guide(task=GuideTask.GOTO, waypoints=np.array([[1.0, 2.0]])))
+    assert usable(motion, GOOD) == (motion, ())
