@@ -1,0 +1,135 @@
+"""Keeps the robot off things, whatever law leads.
+
+The wanted motion is followed ahead with the gait's ramps, to where the robot
+would stand if it were stopped a moment later. If its outline stays clear of all
+points that is what it does; else the nearest motion that does so is chosen, of
+a fixed set with turning, backing off and side steps in it. Standing still is
+always allowed, and whoever is too near already may only move away.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from bluefoot_mpc.navigation.limits import Motion
+from bluefoot_mpc.navigation.outline import OutlineConfig, RampConfig, closest, distances, places
+from bluefoot_mpc.settings import require_nonnegative, require_positive
+from bluefoot_mpc.types import FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class GuardConfig:
+    """Distances to keep, and how motions are weighed against each other."""
+
+    least: float = 0.15  # m from the outline that no motion goes below
+    comfortable: float = 0.25  # m; nearer costs
+    away: float = 0.01  # m that a robot which is too near must gain by a motion
+    reach: float = 1.0  # m around the robot from which points are looked at
+    sectors: int = 72  # around the robot; of each the nearest point counts
+    speed_cost: float = 1.0  # of a difference of `speed_unit`
+    speed_unit: float = 0.1  # m/s
+    turn_cost: float = 1.0  # of a difference of `turn_unit`
+    turn_unit: float = 0.4  # rad/s
+    side_cost: float = 1.5  # of a side step of `speed_unit`
+    near_cost: float = 1.5  # of coming as near as `least`
+    outline: OutlineConfig = field(default_factory=OutlineConfig)
+    ramp: RampConfig = field(default_factory=RampConfig)
+
+    def __post_init__(self) -> None:
+        require_positive(
+            least=self.least, comfortable=self.comfortable, away=self.away, reach=self.reach,
+            sectors=self.sectors, speed_unit=self.speed_unit, turn_unit=self.turn_unit,
+        )  # fmt: skip
+        require_nonnegative(
+            speed_cost=self.speed_cost, turn_cost=self.turn_cost, side_cost=self.side_cost,
+            near_cost=self.near_cost,
+        )  # fmt: skip
+
+
+class Guarded(NamedTuple):
+    """What the guard lets pass.
+
+    Attributes:
+        motion: to be done.
+        clearance: m, from the outline to the nearest point now; infinite in the open.
+        changed: True where it is not what was wanted.
+        stopped: True where nothing but standing is allowed.
+    """
+
+    motion: Motion
+    clearance: float
+    changed: bool
+    stopped: bool
+
+
+class Guard:
+    """Chooses the admissible motion nearest to a wanted one; holds no memory of its own.
+
+    Args:
+        config: distances and costs.
+    """
+
+    def __init__(self, config: GuardConfig) -> None:
+        self._config = config
+        self._motions = _choices()
+
+    def step(self, points: FloatArray, wanted: Motion, now: Motion) -> Guarded:
+        """Judge a wanted motion.
+
+        Args:
+            points: (n, 2) m, what stands around the robot, in the robot frame.
+            wanted: what the leading law wants.
+            now: what the gait does at present.
+        """
+        config = self._config
+        near = self._nearest(points)
+        clearance = float(distances(near, config.outline).min(initial=np.inf))
+        single = np.array((wanted,))
+        along = closest(near, places(now, single, config.ramp), config.outline)
+        if along.min() >= config.comfortable:
+            return Guarded(wanted, clearance, changed=False, stopped=False)
+        motions = np.vstack((single, self._motions))
+        along = closest(near, places(now, motions, config.ramp), config.outline)
+        least = along.min(axis=1)
+        good = (least >= config.least) | ((least >= clearance) & (along[:, -1] >= clearance + config.away))
+        if not good.any():
+            return Guarded(Motion(), clearance, changed=any(wanted), stopped=True)
+        cost = np.where(good, self._cost(motions, wanted, least), np.inf)
+        best = int(cost.argmin())
+        return Guarded(Motion(*motions[best].tolist()), clearance, changed=best > 0, stopped=False)
+
+    def _nearest(self, points: FloatArray) -> FloatArray:
+        """(m, 2) the nearest point of each sector around the robot within reach."""
+        config = self._config
+        square = points[:, 0] ** 2 + points[:, 1] ** 2
+        inside = np.flatnonzero(square < config.reach**2)
+        if inside.size <= config.sectors:
+            return np.ascontiguousarray(points[inside])
+        points, square = points[inside], square[inside]
+        angle = np.arctan2(points[:, 1], points[:, 0])
+        sector = ((angle + np.pi) * (config.sectors / (2.0 * np.pi))).astype(np.intp)
+        order = np.argsort(-square)
+        last = np.full(config.sectors + 1, -1)
+        last[sector[order]] = order  # the nearest is written last
+        return np.ascontiguousarray(points[last[last >= 0]])
+
+    def _cost(self, motions: FloatArray, wanted: Motion, least: FloatArray) -> FloatArray:
+        config = self._config
+        x, y, turn = wanted
+        cost = config.speed_cost / config.speed_unit * np.abs(motions[:, 0] - x)
+        cost += config.side_cost / config.speed_unit * np.abs(motions[:, 1] - y)
+        cost += config.turn_cost / config.turn_unit * np.abs(motions[:, 2] - turn)
+        room = (least - config.least) / (config.comfortable - config.least)
+        return np.asarray(cost + config.near_cost * np.clip(1.0 - room, 0.0, 1.0))
+
+
+def _choices() -> FloatArray:
+    """(k, 3) motions to choose from: arcs, turns in place, backing off, side steps, standing."""
+    speeds, turns = (-0.06, 0.0, 0.04, 0.08, 0.12, 0.16), (-0.45, -0.3, -0.15, 0.0, 0.15, 0.3, 0.45)
+    arcs = [(x, 0.0, turn) for x, turn in itertools.product(speeds, turns)]
+    sides = [(x, y, 0.0) for x, y in itertools.product((-0.03, 0.0, 0.04), (-0.05, 0.05))]
+    return np.array(arcs + sides)

@@ -1,0 +1,103 @@
+"""The robot's outline on the floor, and how near points come to it along a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from bluefoot_mpc.navigation.limits import Motion
+from bluefoot_mpc.settings import require_nonnegative, require_positive
+from bluefoot_mpc.types import FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class OutlineConfig:
+    """A box with round corners about the trunk's origin that holds the swinging legs too."""
+
+    half_length: float = 0.165  # m, to the middle of the rounding
+    half_width: float = 0.165  # m, to the middle of the rounding
+    rounding: float = 0.04  # m
+
+    def __post_init__(self) -> None:
+        require_positive(half_length=self.half_length, half_width=self.half_width)
+        require_nonnegative(rounding=self.rounding)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RampConfig:
+    """How the gait follows a change of command, and how far ahead that is looked at."""
+
+    acceleration: float = 0.1  # m/s², of the gait's own ramp
+    yaw_acceleration: float = 1.0  # rad/s², of the gait's own ramp
+    hold: float = 0.4  # s for which a motion is kept before the robot could be stopping
+    step: float = 0.1  # s between places that are worked out
+    every: int = 3  # of these places the outline is compared with the points
+    steps: int = 18  # places
+
+    def __post_init__(self) -> None:
+        require_positive(
+            acceleration=self.acceleration, yaw_acceleration=self.yaw_acceleration, step=self.step,
+            every=self.every, steps=self.steps,
+        )  # fmt: skip
+        require_nonnegative(hold=self.hold)
+
+
+class Places(NamedTuple):
+    """Where the robot will be: (k, s) for k motions and s moments, in the present robot frame (m, rad)."""
+
+    x: FloatArray
+    y: FloatArray
+    yaw: FloatArray
+
+
+def distances(points: FloatArray, config: OutlineConfig) -> FloatArray:
+    """(n,) m from the outline to (n, 2) points in the robot frame; negative inside the rounding only."""
+    x = np.maximum(np.abs(points[:, 0]) - config.half_length, 0.0)
+    y = np.maximum(np.abs(points[:, 1]) - config.half_width, 0.0)
+    return np.asarray(np.sqrt(x * x + y * y) - config.rounding)
+
+
+def places(now: Motion, motions: FloatArray, config: RampConfig) -> Places:
+    """Where (k, 3) motions lead that are held for a while and then ended, by the gait's ramps.
+
+    Args:
+        now: what the gait does at present.
+        motions: (k, 3) m/s forward and left, rad/s.
+        config: ramps and times.
+    """
+    time = (np.arange(config.steps) + 0.5) * config.step
+    ramp = np.array((config.acceleration, config.acceleration, config.yaw_acceleration))
+    start = np.array(now)
+    way = motions[:, :, None] - start[None, :, None]
+    reach = ramp[:, None] * np.minimum(time, config.hold)
+    rate = start[None, :, None] + np.clip(way, -reach, reach)
+    fade = ramp[:, None] * np.maximum(time - config.hold, 0.0)
+    rate = np.sign(rate) * np.maximum(np.abs(rate) - fade, 0.0)
+    turned = np.cumsum(rate[:, 2], axis=1) * config.step
+    middle = turned - 0.5 * config.step * rate[:, 2]
+    cos, sin = np.cos(middle), np.sin(middle)
+    x = np.cumsum(cos * rate[:, 0] - sin * rate[:, 1], axis=1) * config.step
+    y = np.cumsum(sin * rate[:, 0] + cos * rate[:, 1], axis=1) * config.step
+    pick = slice(config.every - 1, None, config.every)
+    return Places(x[:, pick], y[:, pick], turned[:, pick])
+
+
+def closest(points: FloatArray, where: Places, outline: OutlineConfig) -> FloatArray:
+    """(k, s) m from the outline at each place to the nearest of (n, 2) points; infinite without points."""
+    if not len(points):
+        return np.full(where.x.shape, np.inf)
+    dx = points[:, 0] - where.x[:, :, None]
+    dy = points[:, 1] - where.y[:, :, None]
+    cos, sin = np.cos(where.yaw)[:, :, None], np.sin(where.yaw)[:, :, None]
+    x = np.abs(cos * dx + sin * dy)
+    y = np.abs(cos * dy - sin * dx)
+    x -= outline.half_length
+    y -= outline.half_width
+    np.maximum(x, 0.0, out=x)
+    np.maximum(y, 0.0, out=y)
+    x *= x
+    y *= y
+    x += y
+    return np.asarray(np.sqrt(x.min(axis=2)) - outline.rounding)

@@ -1,0 +1,142 @@
+"""From a LIDAR sweep to what stands around the robot, in the levelled robot frame.
+
+The LIDAR is fixed to the trunk, so its plane tilts with it: with the nose down a
+ray meets the floor ahead, which is nothing to avoid. The levelled robot frame has
+its origin at the trunk's, x along the heading, z up.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bluefoot_mpc.model.parameters import SensorMounts
+from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
+from bluefoot_mpc.types import BodyState, BoolArray, FloatArray, LidarScan
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ScanConfig:
+    """What is made of a sweep, and which sweeps are of use."""
+
+    greatest_range: float = 5.6  # m; a ray without an echo counts as this far (URG-04LX)
+    least_range: float = 0.02  # m; nearer values are the sensor's error codes
+    floor_height: float = 0.06  # m above the feet; lower echoes are the floor
+    floor_slope: float = 0.012  # added to it per metre of range: errors of the tilt grow with it
+    stale_after: float = 0.5  # s without a new sweep: the robot stands
+    least_rays: int = 40  # in a sweep that is of use
+    least_view_deg: float = 60.0  # degrees that it must cover to either side of forward
+    greatest_gap_deg: float = 3.0  # degrees between neighbouring rays, at most
+
+    def __post_init__(self) -> None:
+        require_positive(
+            greatest_range=self.greatest_range, stale_after=self.stale_after, least_rays=self.least_rays,
+            greatest_gap_deg=self.greatest_gap_deg,
+        )  # fmt: skip
+        require_nonnegative(
+            least_range=self.least_range, floor_height=self.floor_height, floor_slope=self.floor_slope
+        )
+        require_range(1.0, 180.0, least_view_deg=self.least_view_deg)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class LevelScan:
+    """A usable sweep.
+
+    Attributes:
+        time: s, end of the sweep.
+        bearing: (n,) rad from forward in the LIDAR's plane, rising, left positive.
+        distance: (n,) m; where nothing came back the greatest range.
+        points: (n, 2) m, ends of the rays in the levelled robot frame.
+        hit: (n,) True where the ray ended at a thing: neither on the floor nor nowhere.
+        origin: (2,) m, the LIDAR in the levelled robot frame.
+    """
+
+    time: float
+    bearing: FloatArray
+    distance: FloatArray
+    points: FloatArray
+    hit: BoolArray
+    origin: FloatArray
+
+
+class ScanReader:
+    """Makes sweeps level; keeps what depends on the bearings alone.
+
+    Args:
+        config: which sweeps are of use.
+        mounts: where the LIDAR is.
+    """
+
+    def __init__(self, config: ScanConfig, mounts: SensorMounts) -> None:
+        self._config = config
+        self._mount = mounts.lidar
+        self._bearing = np.zeros(0)
+        self._directions = np.zeros((0, 2))
+        self._fault = "no rays"
+
+    def read(self, scan: LidarScan, estimate: BodyState) -> LevelScan | str:
+        """The levelled sweep, or why it is of no use, in few words.
+
+        Args:
+            scan: as it came from the sensor.
+            estimate: the robot at the time of the sweep; its tilt and height count.
+        """
+        fault = self._unusable(scan)
+        if fault:
+            return fault
+        config = self._config
+        raw = np.asarray(scan.distance, dtype=np.float64)
+        echo = (raw >= config.least_range) & (raw <= config.greatest_range)
+        if not echo.any():
+            return "no echo in the whole sweep"
+        distance = np.where(echo, raw, config.greatest_range)
+        points, height, origin = self._levelled(distance, estimate)
+        hit = echo & (height > config.floor_height + config.floor_slope * distance)
+        return LevelScan(
+            time=scan.time, bearing=self._bearing, distance=distance, points=points, hit=hit, origin=origin
+        )
+
+    def _levelled(
+        self, distance: FloatArray, estimate: BodyState
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Ends of the rays: (n, 2) in the robot frame and (n,) above the feet; and (2,) the LIDAR."""
+        roll, pitch, _ = estimate.rpy.tolist()
+        cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+        x, y, z = self._mount
+        origin = np.array((cp * x + sp * (sr * y + cr * z), cr * y - sr * z))
+        lift = -sp * x + cp * (sr * y + cr * z) + estimate.height
+        level = self._directions @ np.array(((cp, 0.0), (sp * sr, cr)))
+        rise = self._directions @ np.array((-sp, cp * sr))
+        return origin + distance[:, None] * level, lift + distance * rise, origin
+
+    def _unusable(self, scan: LidarScan) -> str:
+        """Why the sweep is of no use; empty where it is."""
+        if not scan.valid:
+            return "sweep marked as invalid"
+        if scan.bearing.shape != scan.distance.shape or scan.bearing.ndim != 1:
+            return "bearings and distances do not match"
+        if not np.array_equal(scan.bearing, self._bearing):
+            self._take_bearings(np.array(scan.bearing, dtype=np.float64))
+        return self._fault
+
+    def _take_bearings(self, bearing: FloatArray) -> None:
+        self._bearing = bearing
+        self._directions = np.column_stack((np.cos(bearing), np.sin(bearing)))
+        self._fault = self._unusable_bearings(bearing)
+
+    def _unusable_bearings(self, bearing: FloatArray) -> str:
+        if not np.isfinite(bearing).all():
+            return "bearings are not numbers"
+        if bearing.size < self._config.least_rays:
+            return f"only {bearing.size} rays"
+        steps = np.diff(bearing)
+        if steps.min() <= 0.0:
+            return "bearings do not rise from right to left"
+        if steps.max() > math.radians(self._config.greatest_gap_deg):
+            return "gaps between the rays"
+        if min(-bearing[0], bearing[-1]) < math.radians(self._config.least_view_deg):
+            return "the sweep does not reach far enough to both sides"
+        return ""
