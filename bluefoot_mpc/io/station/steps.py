@@ -144,9 +144,9 @@ def waypoints(points: Sequence[Sequence[float]] | FloatArray) -> FloatArray:
     if not pairs:
         raise ConfigurationError("points is empty: name at least one, m forward and m to the left")
     for number, pair in enumerate(pairs, start=1):
-        if not all(map(math.isfinite, pair)):
+        if not all(abs(value) <= REACH for value in pair):
             raise ConfigurationError(
-                f"point {number} of {len(pairs)} is {pair}: it must be two finite numbers"
+                f"point {number} is {pair}: both numbers must lie in -{REACH:g}..{REACH:g} m"
             )
     return np.array(pairs)
 
@@ -155,11 +155,14 @@ def read_steps(text: str) -> Steps:
     """The steps of a text, or of the file that it names.
 
     Raises:
-        ConfigurationError: a step cannot be understood; the message names it.
+        ConfigurationError: a step cannot be understood, and the message names it; or the file cannot be read.
         UnknownNameError: there is no such step.
     """
-    if "\n" not in text and len(text) < 1000 and Path(text).is_file():
-        text = Path(text).read_text(encoding="utf-8")
+    if "\n" not in text and _names_file(text):
+        try:
+            text = Path(text).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ConfigurationError(f"cannot read the script {text}: {error}") from error
     lines = (line.partition("#")[0].strip() for line in text.replace(";", "\n").splitlines())
     steps = Steps()
     for line in filter(None, lines):
@@ -167,6 +170,13 @@ def read_steps(text: str) -> Steps:
     if not steps.commands:
         raise ConfigurationError("the script has no steps, for example: walk 5 forward=0.06; sit 2")
     return steps
+
+
+def _names_file(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except OSError:  # longer than a name can be
+        return False
 
 
 def _step(steps: Steps, line: str) -> None:
