@@ -1,0 +1,183 @@
+"""The marker in the camera's pictures: found by colour, measured on its edge."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bluefoot_mpc.navigation import marker_colour, marker_edge
+from bluefoot_mpc.navigation.marker_colour import Blob
+from bluefoot_mpc.navigation.marker_edge import Cone, Lens
+from bluefoot_mpc.settings import require_positive, require_range
+from bluefoot_mpc.types import CameraImage
+
+LEAST_SIDE = 24
+"""Pixels: smaller pictures show nothing that could be measured."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class MarkerConfig:
+    """How the marker looks, and what is taken for it.
+
+    The thresholds around the colour are wide, for shading and exposure; what decides is the edge: a ball's
+    outline is a circle on the unit sphere around the camera, wherever in the picture it is.
+    """
+
+    red: float = 0.90  # 0..1, colour of the ball in plain light
+    green: float = 0.10  # 0..1
+    blue: float = 0.55  # 0..1
+    hue_tolerance_deg: float = 16.0  # degrees either way on the circle of hues
+    least_saturation: float = 0.38  # 0..1
+    least_value: float = 0.10  # 0..1, brightest of red, green and blue
+    least_radius: float = 3.5  # pixels of a picture 640 wide: 8 m away for a ball of 0.06 m
+    greatest_radius: float = 0.9  # share of the picture's height
+    least_arc_deg: float = 80.0  # degrees of the outline that must be in sight
+    least_support: float = 0.72  # share of the outline in sight where an edge fits
+    least_merged_support: float = 0.62  # the same before something of the marker's colour
+    greatest_residual: float = 0.035  # of the radius, mean distance of the edge from the fit
+    rays: int = 64  # directions from the middle along which the edge is looked for
+    candidates: int = 5  # patches of the colour that are examined, largest first
+
+    def __post_init__(self) -> None:
+        require_range(0.0, 1.0, red=self.red, green=self.green, blue=self.blue)
+        require_range(1.0, 60.0, hue_tolerance_deg=self.hue_tolerance_deg)
+        require_range(0.0, 1.0, least_saturation=self.least_saturation, least_value=self.least_value)
+        require_positive(least_radius=self.least_radius, greatest_residual=self.greatest_residual)
+        require_range(0.05, 5.0, greatest_radius=self.greatest_radius)
+        require_range(45.0, 360.0, least_arc_deg=self.least_arc_deg)
+        require_range(
+            0.3, 1.0, least_support=self.least_support, least_merged_support=self.least_merged_support
+        )
+        require_range(16, 512, rays=self.rays)
+        require_range(1, 50, candidates=self.candidates)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Sighting:
+    """The marker in one picture.
+
+    Attributes:
+        time: s, time of exposure.
+        column: pixels from the left edge, where the ball's centre is (0.5 is the middle of the first pixel).
+        row: pixels from the upper edge.
+        radius: pixels that the ball's outline would have in the middle of the picture: the tangent of its
+            angular radius times the focal length. Range follows from it wherever the ball is.
+        width: pixels, of the whole picture.
+        height: pixels.
+        focal: pixels, focal length that the measurement used.
+        arc: share of the outline in sight, 0..1.
+        support: share of that on which an edge fits, 0..1.
+    """
+
+    time: float
+    column: float
+    row: float
+    radius: float
+    width: int
+    height: int
+    focal: float
+    arc: float
+    support: float
+
+
+class MarkerFinder:
+    """Finds the marker in pictures, one by one; keeps no memory but the reason for the last answer.
+
+    Colour first, on a picture of half size. Each patch of the marker's colour gets a circle through its
+    contour; a patch that no circle explains (a wall of that colour behind the ball, say) is searched with
+    Hough's transform for circles inside. A circle counts once its edge, sampled in the full picture, fits.
+
+    How to call: `find(frame.camera)` whenever there is a new picture; None means not seen, and `reason`
+    says why. OpenCV is imported at the first picture.
+
+    Args:
+        config: how the marker looks.
+        camera_view_deg: degrees from edge to edge, `SensorMounts.camera_view_deg`.
+    """
+
+    def __init__(self, config: MarkerConfig, camera_view_deg: float = 63.0) -> None:
+        self._config = config
+        self._half_view = math.tan(0.5 * math.radians(camera_view_deg))
+        self._colour = marker_colour.ColourRange.around(
+            (config.red, config.green, config.blue), config.hue_tolerance_deg,
+            config.least_saturation, config.least_value,
+        )  # fmt: skip
+        self._reason = "no picture yet"
+
+    @property
+    def reason(self) -> str:
+        """Why the last picture gave no sighting; empty where it gave one."""
+        return self._reason
+
+    def find(self, image: CameraImage | None) -> Sighting | None:
+        """Look for the marker.
+
+        Args:
+            image: a picture of any size; None, an invalid, grey, empty or otherwise wrong one gives None.
+        """
+        self._reason = _fault(image)
+        if image is None or self._reason:
+            return None
+        pixels = np.ascontiguousarray(image.pixels)
+        height, width = pixels.shape[:2]
+        lens = Lens(focal=0.5 * width / self._half_view, column=0.5 * width, row=0.5 * height)
+        best: Cone | None = None
+        blobs = marker_colour.blobs(pixels, self._colour, self._config.candidates, self._least_radius(width))
+        for blob in blobs:
+            found = self._examine(pixels, blob, lens)
+            if found is not None and (best is None or found.score > best.score):
+                best = found
+        if best is None:
+            self._reason = "no round patch of the marker's colour" if blobs else "nothing of its colour"
+            return None
+        column, row = lens.project(best.axis)
+        return Sighting(
+            time=image.time, column=column, row=row, radius=lens.focal * math.tan(best.angle),
+            width=width, height=height, focal=lens.focal, arc=best.arc, support=best.support,
+        )  # fmt: skip
+
+    def _least_radius(self, width: int) -> float:
+        return max(2.5, self._config.least_radius * width / 640.0)
+
+    def _examine(self, pixels: Any, blob: Blob, lens: Lens) -> Cone | None:
+        """The ball in one patch of colour, from its contour or else from circles inside."""
+        patch = marker_colour.cut(pixels, blob, self._colour)
+        limits = marker_edge.Limits(
+            least_radius=self._least_radius(pixels.shape[1]),
+            greatest_radius=self._config.greatest_radius * pixels.shape[0],
+            least_arc=self._config.least_arc_deg / 360.0,
+            least_support=self._config.least_support,
+            least_merged_support=self._config.least_merged_support,
+            greatest_residual=self._config.greatest_residual,
+            rays=self._config.rays,
+        )
+        circle = marker_colour.contour_circle(patch)
+        if circle is not None:
+            cone = marker_edge.measure(patch, circle, lens, limits)
+            if cone is not None:
+                return cone
+        best: Cone | None = None
+        for inside in marker_colour.hough_circles(patch, limits.least_radius, limits.greatest_radius):
+            cone = marker_edge.measure(patch, inside, lens, limits)
+            if cone is not None and (best is None or cone.score > best.score):
+                best = cone
+        return best
+
+
+def _fault(image: CameraImage | None) -> str:
+    """Why a picture cannot be used, in few words; empty when it can."""
+    if image is None:
+        return "no picture"
+    if not image.valid:
+        return "the camera calls the picture unusable"
+    pixels = image.pixels
+    if not isinstance(pixels, np.ndarray) or pixels.dtype != np.uint8:
+        return "the picture is not one of bytes"
+    if pixels.ndim != 3 or pixels.shape[2] != 3:
+        return "the picture is not red, green and blue"
+    if min(pixels.shape[:2]) < LEAST_SIDE:
+        return f"the picture is smaller than {LEAST_SIDE} pixels"
+    return "" if math.isfinite(image.time) else "the picture has no time"
