@@ -16,6 +16,7 @@ from bluefoot_mpc.estimation.config import EstimatorConfig
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.leveling.config import LevelingConfig
 from bluefoot_mpc.model.legs.ankle import AnkleConfig
+from bluefoot_mpc.navigation.config import NavigationConfig
 from bluefoot_mpc.zmp.placement import PlacementConfig
 from bluefoot_mpc.zmp.preview import PreviewConfig
 
@@ -31,6 +32,7 @@ class ControlConfig:
     sway: SwayConfig = field(default_factory=SwayConfig)
     zmp: PlacementConfig = field(default_factory=PlacementConfig)
     preview: PreviewConfig = field(default_factory=PreviewConfig)
+    navigation: NavigationConfig = field(default_factory=NavigationConfig)
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
     ground: GroundAdaptationConfig = field(default_factory=GroundAdaptationConfig)
     push_recovery: PushRecoveryConfig = field(default_factory=PushRecoveryConfig)

@@ -1,6 +1,6 @@
 """The stages in their order: the only place that knows it.
 
-sensors -> estimation -> modes -> tracking -> gait and footholds -> ground plane
+sensors -> estimation -> modes -> guidance -> tracking -> gait and footholds -> ground plane
 -> trunk placement (static law or preview) -> inverse kinematics -> whole-body
 problem -> servo mapping -> trunk levelling -> joint goals.
 """
@@ -18,6 +18,7 @@ from bluefoot_mpc.control.command import usable
 from bluefoot_mpc.control.config import ControlConfig
 from bluefoot_mpc.control.gait_sway import GaitSway
 from bluefoot_mpc.control.ground import GroundAdapter
+from bluefoot_mpc.control.guidance import Guidance
 from bluefoot_mpc.control.leg_masses import LegMasses
 from bluefoot_mpc.control.leveling import LevelStage, LevelWish, recorded_gait
 from bluefoot_mpc.control.planned_body import PlannedBody
@@ -83,6 +84,7 @@ class Pipeline:
         self._body = PlannedBody(robot.parameters.servo)
         self._planner = BodyPlanner(robot, config.whole_body) if config.whole_body.enabled else None
         self._ground = GroundAdapter(config.ground)
+        self._guidance = Guidance(config.navigation, robot.parameters.sensors)
         self._recovery = PushRecovery(config.push_recovery)
         self._step_back = plans.StepBack()
         self._require_reachable()
@@ -99,6 +101,7 @@ class Pipeline:
         if self._planner is not None:
             self._planner.reset()
         self._ground.reset()
+        self._guidance.reset()
         self._recovery.reset()
         if self._level is not None:
             self._level.reset()
@@ -143,7 +146,9 @@ class Pipeline:
         begun = self._begun((*faults, *own.reasons) if estimate.healthy else (*faults, *own.reasons, BLIND))
         urgent = plans.more_urgent(safety or SafetyRequest(), own)
         changed = self._advance_mode(urgent, float(upright[2, 2]))
-        motion = self._in_force(self._wanted, estimate)
+        walks = self._walks(estimate)
+        guided, navigation = self._guidance.step(self._wanted, frame, estimate, walks=walks, dt=dt)
+        motion = self._in_force(guided, walks)
         twist = self._corrected(motion, estimate, upright)
         gait = self._gait.step(self._gait_inputs(twist, motion, estimate, upright), dt)
         self._walking = gait.phase.walking
@@ -164,7 +169,7 @@ class Pipeline:
         telemetry = Telemetry(
             time=frame.time, mode=self._modes.mode, motion=motion, estimate=estimate, phase=gait.phase,
             reference=reference, zmp=zmp, events=begun + held + cut + changed + leveling,
-            plan=planned, level=level,
+            plan=planned, level=level, navigation=navigation,
         )  # fmt: skip
         return ControlOutput(command=command, telemetry=telemetry)
 
@@ -217,10 +222,15 @@ class Pipeline:
         self._notices = notices
         return new
 
-    def _in_force(self, motion: MotionCommand, estimate: BodyState) -> MotionCommand:
-        """The command, without its motion where the robot must not walk: other modes, or a blind estimate."""
-        walks = motion.mode is Mode.WALK and self._modes.mode is Mode.WALK and self._modes.ending == 0.0
-        if walks and estimate.healthy:
+    def _walks(self, estimate: BodyState) -> bool:
+        """False where the robot must not walk: in other modes, or with a blind estimate."""
+        wanted, state = self._wanted.mode, self._modes
+        return wanted is Mode.WALK and state.mode is Mode.WALK and state.ending == 0.0 and estimate.healthy
+
+    @staticmethod
+    def _in_force(motion: MotionCommand, walks: bool) -> MotionCommand:
+        """The command, without its motion where the robot must not walk."""
+        if walks:
             return motion
         return MotionCommand(mode=motion.mode, gait=motion.gait, trunk=motion.trunk)
 

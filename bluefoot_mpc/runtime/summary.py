@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +20,7 @@ import orjson
 
 from bluefoot_mpc.model.parameters import GRAVITY, load_parameters
 from bluefoot_mpc.runtime import metrics
-from bluefoot_mpc.runtime.data import COMPLETED, RunData
+from bluefoot_mpc.runtime.data import COMPLETED, CommandRecord, RunData
 from bluefoot_mpc.runtime.window import Window, cut_window, measurement_window, wanted_commands
 from bluefoot_mpc.types import Mode
 from bluefoot_mpc.zmp.support import support_margins
@@ -76,7 +76,7 @@ def summarize(
         "fell": has_fallen,
         "success": (run.stop_reason == COMPLETED and not has_fallen) if success is None else success,
         "stop_reason": run.stop_reason,
-        "speed_ref_mps": float(np.hypot(*commands[-1].motion.velocity)) if commands else None,
+        "speed_ref_mps": _wanted_speed(commands),
         "servo_temp_max_c": _hottest(run),
         **_ticks(run),
         **_solves(run),
@@ -127,6 +127,13 @@ def duration(run: RunData) -> float:
 def config_sha256(config: Mapping[str, Any]) -> str:
     """Hash of a configuration table, the same for the same values in any order."""
     return hashlib.sha256(orjson.dumps(dict(config), option=orjson.OPT_SORT_KEYS)).hexdigest()
+
+
+def _wanted_speed(commands: Sequence[CommandRecord]) -> float | None:
+    """m/s, as commanded last; None where the robot chooses its speed itself."""
+    if not commands or commands[-1].motion.guide is not None:
+        return None
+    return float(np.hypot(*commands[-1].motion.velocity))
 
 
 def _identity(run: RunData) -> dict[str, Any]:

@@ -10,12 +10,25 @@ from pathlib import Path
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.scenarios.base import Scenario, ScenarioConfig
 from bluefoot_mpc.scenarios.leveling import Level
+from bluefoot_mpc.scenarios.navigating import Goto, Wander
 from bluefoot_mpc.scenarios.posing import Pose, Stand
 from bluefoot_mpc.scenarios.remote import Remote
 from bluefoot_mpc.scenarios.walking import Push, Transition, Turn, Walk
 
 SHIPPED: dict[str, type[Scenario]] = {
-    scenario.name: scenario for scenario in (Stand, Pose, Walk, Turn, Transition, Push, Level, Remote)
+    scenario.name: scenario
+    for scenario in (
+        Stand,
+        Pose,
+        Walk,
+        Turn,
+        Transition,
+        Push,
+        Level,
+        Wander,
+        Goto,
+        Remote,
+    )
 }
 
 

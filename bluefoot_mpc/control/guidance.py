@@ -1,0 +1,58 @@
+"""The stage that lets navigation decide the motion of a guided task."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from bluefoot_mpc.model.parameters import SensorMounts
+from bluefoot_mpc.navigation.config import NavigationConfig
+from bluefoot_mpc.navigation.navigator import Navigator
+from bluefoot_mpc.types import BodyState, MotionCommand, NavigationReport, SensorFrame, TrunkPose
+
+
+class Guidance:
+    """Velocity, yaw rate and the trunk's pitch of a command with a guide; other commands pass as they are.
+
+    Args:
+        config: of navigation.
+        mounts: where LIDAR and camera are.
+    """
+
+    def __init__(self, config: NavigationConfig, mounts: SensorMounts) -> None:
+        self._navigator = Navigator(config, mounts)
+        self._guides = False
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._navigator.reset()
+        self._guides = False
+
+    def step(
+        self, motion: MotionCommand, frame: SensorFrame, estimate: BodyState, *, walks: bool, dt: float
+    ) -> tuple[MotionCommand, NavigationReport | None]:
+        """One tick.
+
+        Args:
+            motion: what the operator or script wants.
+            frame: the newest sensor frame.
+            estimate: where the robot is.
+            walks: the robot may walk now; while it may not, navigation waits.
+            dt: s.
+
+        Returns:
+            The command with the motion that was decided, and how it was; None without a guide.
+        """
+        if motion.guide is None:
+            if self._guides:
+                self.reset()
+            return motion, None
+        self._guides = True
+        if not walks:
+            return motion, None
+        decision = self._navigator.step(motion.guide, frame, estimate, dt)
+        pitched = np.array([0.0, decision.pitch, 0.0])
+        trunk = TrunkPose(position=motion.trunk.position, rpy=motion.trunk.rpy + pitched)
+        guided = replace(motion, velocity=decision.velocity, yaw_rate=decision.yaw_rate, trunk=trunk)
+        return guided, decision.report
