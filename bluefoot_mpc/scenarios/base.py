@@ -118,6 +118,11 @@ class Scenario(ABC):
         return ()
 
     @property
+    def uses(self) -> tuple[str, ...]:
+        """Sensors that a simulated robot gets for it: those that it needs, or can make use of."""
+        return self.needs
+
+    @property
     def scripted(self) -> bool:
         """False where the commands come from a ground station; by default they come from here."""
         return True

@@ -151,10 +151,10 @@ def _own_control(scenario: Scenario, controller: str) -> Mapping[str, Any]:
 
 
 def _surroundings(scenario: Scenario) -> dict[str, Any]:
-    """The world that a scenario runs in where nobody chooses, and the sensors that it needs."""
-    sensors = {name: {"enabled": True} for name in scenario.needs}
+    """The world that a scenario runs in where nobody chooses, and the sensors that it uses."""
+    sensors = {name: {"enabled": True} for name in scenario.uses}
     table: dict[str, Any] = {"sim": {"world": {"name": scenario.default_world}, **sensors}}
-    return table | {"devices": {"emulate_lidar": True}} if "lidar" in scenario.needs else table
+    return table | {"devices": {"emulate_lidar": True}} if "lidar" in sensors else table
 
 
 def _require_sensors(scenario: Scenario, devices: DevicesConfig, robot: str) -> None:

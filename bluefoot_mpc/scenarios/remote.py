@@ -7,7 +7,7 @@ from typing import Any
 
 from bluefoot_mpc.io.station.steps import Steps, read_steps
 from bluefoot_mpc.scenarios.base import Scenario, ScenarioConfig
-from bluefoot_mpc.types import MotionCommand
+from bluefoot_mpc.types import GuideTask, MotionCommand
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -28,6 +28,20 @@ class Remote(Scenario):
     def __init__(self, config: Any = None) -> None:
         super().__init__(config)
         self._steps: Steps | None = read_steps(self.config.script) if self.config.script else None
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """What the script's tasks are done with; a station may ask for tasks or not."""
+        guides = [] if self._steps is None else [c.guide for c in self._steps.commands if c.guide is not None]
+        if not guides:
+            return ()
+        seeks = any(guide.task in (GuideTask.APPROACH, GuideTask.FOLLOW) for guide in guides)
+        return ("lidar", "camera") if seeks else ("lidar",)
+
+    @property
+    def uses(self) -> tuple[str, ...]:
+        """A station's waypoints are found by LIDAR."""
+        return self.needs or (() if self.scripted else ("lidar",))
 
     @property
     def scripted(self) -> bool:
