@@ -9,6 +9,7 @@ from typing import Literal
 
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.settings import require_finite, require_nonnegative, require_positive, require_range
+from bluefoot_mpc.sim.sight_config import CameraConfig, LidarConfig
 
 OPEN_WORLDS = ("flat", "rough", "slope", "steps")
 """Names of the worlds that are nothing but ground."""
@@ -176,6 +177,8 @@ class SimConfig:
     settle_time: float = 0.5  # s of standing before the run starts
     visuals: bool = False  # keep the shapes that are only to look at, for pictures from MuJoCo
     sensors: SensorConfig = field(default_factory=SensorConfig)
+    lidar: LidarConfig = field(default_factory=LidarConfig)
+    camera: CameraConfig = field(default_factory=CameraConfig)
     world: WorldConfig = field(default_factory=WorldConfig)
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
     pushes: tuple[PushConfig, ...] = ()

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 
 from bluefoot_mpc.model.robot import RobotModel
-from bluefoot_mpc.sim.body import NEVER, Posture, SimBody
+from bluefoot_mpc.sim.body import Posture, SimBody
 from bluefoot_mpc.sim.config import SimConfig
+from bluefoot_mpc.sim.sight import Sight
 from bluefoot_mpc.types import N_JOINTS, JointCommand, SensorFrame
 
 
@@ -29,6 +31,7 @@ class SimRobot(SimBody):
         self.period = config.command_period
         self._start = Posture(joints=robot.stance_joints, height=float(robot.default_stance()[2]))
         self._commands: deque[tuple[int, JointCommand]] = deque()
+        self._sight = Sight(self._world, robot.parameters.sensors, config, seed)
         self._frame = self.reset()
 
     def reset(self) -> SensorFrame:
@@ -37,6 +40,7 @@ class SimRobot(SimBody):
         self.discarded_commands = 0
         self._place(self._start)
         self._bank.hold(self._start.joints)
+        self._sight.reset()
         # Standing still is simulated before time zero, the last command period with sensors.
         settle = max(1, math.ceil(self.config.settle_time / self.config.command_period)) * self._steps
         self._step = -settle
@@ -45,6 +49,7 @@ class SimRobot(SimBody):
             self._bank.cool()
             self._frame = self._run_frame()
         self._start_clock()
+        self._frame = self._with_sight(self._frame)
         return self._frame
 
     def step(self, command: JointCommand) -> SensorFrame:
@@ -61,7 +66,7 @@ class SimRobot(SimBody):
             self._next_event = min(self._next_event, self._step + self._latency)
         else:
             self.discarded_commands += 1
-        self._frame = self._run_frame()
+        self._frame = self._with_sight(self._run_frame())
         return self._frame
 
     def stop(self) -> None:
@@ -73,13 +78,27 @@ class SimRobot(SimBody):
         self._bank.write(limp)
 
     def close(self) -> None:
-        """Nothing to give back; the memory goes with the object."""
+        """Give the graphics memory back, where there is a camera. Idempotent."""
+        self._sight.close()
 
     def _handle_events(self, step: int) -> None:
-        """Deliver the commands that have arrived and switch pushes on and off."""
+        """Deliver the commands that have arrived, switch pushes on and off, and look around."""
         commands = self._commands
         while commands and commands[0][0] <= step:
             self._bank.write(commands.popleft()[1])
-        self._next_event = commands[0][0] if commands else NEVER
+        if step >= self._sight.due:
+            self._sight.look(step)
+        self._next_event = min(commands[0][0], self._sight.due) if commands else self._sight.due
         if self._pushes:
             self._next_event = min(self._next_event, self._push(step))
+
+    def _with_sight(self, frame: SensorFrame) -> SensorFrame:
+        """The frame with what LIDAR and camera have seen up to its instant."""
+        sight = self._sight
+        if self._step >= sight.due:
+            sight.look(self._step)
+        self._next_event = min(self._next_event, sight.due)
+        if not sight.has_news:
+            return frame
+        scan, image = sight.take(self._step)
+        return frame if scan is None and image is None else replace(frame, lidar=scan, camera=image)
