@@ -145,9 +145,9 @@ def cut(pixels: Any, blob: Blob, colour: ColourRange) -> Patch:
 
 
 def contour_circle(patch: Patch) -> Circle | None:
-    """The circle on which most of the patch's contour lies; what an obstacle or the picture's edge cuts may miss.
+    """The circle on which most of the patch's contour lies; None where there is none.
 
-    Circles through three points each are tried and scored by the contour's length on them.
+    What an obstacle or the picture's edge cuts off may miss. Circles through three points each are tried and scored by the contour's length on them.
     """
     points = _contour(patch)
     if len(points) < 8:
@@ -200,14 +200,15 @@ def hough_circles(patch: Patch, least: float, greatest: float) -> list[Circle]:
 
 
 def _contour(patch: Patch) -> FloatArray:
-    """(n, 2) column, row in the patch of its largest contour, at most 120 points, none on the picture's edge."""
+    """(n, 2) column, row in the patch of its largest contour: at most 120, none on the picture's edge."""
     import cv2  # noqa: PLC0415
 
     contours, _ = cv2.findContours(patch.mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
         return np.zeros((0, 2))
     # By their boxes: a thin rest beside the ball may be long but is not large.
-    largest = max(contours, key=lambda c: (lambda box: box[2] * box[3])(cv2.boundingRect(c)))
+    boxes = [cv2.boundingRect(contour) for contour in contours]
+    largest = contours[max(range(len(boxes)), key=lambda k: boxes[k][2] * boxes[k][3])]
     points = largest.reshape(-1, 2)[:: max(1, len(largest) // 120)] + 0.5
     column = patch.left + patch.scale * points[:, 0]
     row = patch.upper + patch.scale * points[:, 1]

@@ -137,7 +137,7 @@ class Rim:
 
     def __init__(self, patch: Patch, lens: Lens, cone: Cone, rays: int) -> None:
         self.patch, self.lens, self.cone = patch, lens, cone
-        self.phase = np.arange(rays) * (2.0 * math.pi / rays)
+        self.phase: FloatArray = np.arange(rays, dtype=np.float64) * (2.0 * math.pi / rays)
         # Two directions across the axis, the first level: the second points down for a level camera.
         level = np.array([cone.axis[2], 0.0, -cone.axis[0]])
         level /= np.linalg.norm(level)

@@ -1,0 +1,168 @@
+"""Approaching and following a marker: what camera, target, servoing and search come to on each tick."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bluefoot_mpc.model.parameters import SensorMounts
+from bluefoot_mpc.navigation import servoing
+from bluefoot_mpc.navigation.limits import Motion
+from bluefoot_mpc.navigation.marker import MarkerConfig, MarkerFinder, Sighting
+from bluefoot_mpc.navigation.search import Search, SearchConfig
+from bluefoot_mpc.navigation.servoing import Servo, ServoingConfig
+from bluefoot_mpc.navigation.target import Target, TargetConfig
+from bluefoot_mpc.settings import require_positive
+from bluefoot_mpc.types import BodyState, CameraImage, FloatArray, Guide, Guided, GuideTask, SensorFrame
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class MarkerTaskConfig:
+    """Configuration of the parts, and how long one missed picture does not matter."""
+
+    finder: MarkerConfig = field(default_factory=MarkerConfig)
+    target: TargetConfig = field(default_factory=TargetConfig)
+    servoing: ServoingConfig = field(default_factory=ServoingConfig)
+    search: SearchConfig = field(default_factory=SearchConfig)
+    blink: float = 0.5  # s without a sighting for which the camera goes on leading
+
+    def __post_init__(self) -> None:
+        require_positive(blink=self.blink)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class MarkerWish:
+    """What the marker asks of this tick.
+
+    Wanted motion = `share` · `motion` + (1 − `share`) · LIDAR, where LIDAR is the way to `goal` around what
+    stands there (as to a waypoint), or the plain potential field where there is no goal. The guard comes
+    behind it as always.
+
+    Attributes:
+        guided: MARKER while it leads, ARRIVED while the robot stands at its distance, SEARCH otherwise.
+        motion: m/s and rad/s, heading frame.
+        share: of `motion` in the command, 0..1.
+        goal: (2,) m in the odometry frame; None without one.
+        pitch: rad, of the trunk, nose down positive.
+        mixing: the camera's share for the report: κ, and 0 while the marker is not seen.
+        marker: (3,) px, column, row and radius in the newest picture; NaN where unseen.
+        position: (3,) m, the marker's centre in the odometry frame as last seen or predicted; NaN before.
+        age: s since it was last seen; infinite before.
+        reason: in few words.
+    """
+
+    guided: Guided
+    motion: Motion
+    share: float
+    goal: FloatArray | None
+    pitch: float
+    mixing: float
+    marker: FloatArray
+    position: FloatArray
+    age: float
+    reason: str
+
+
+class MarkerTask:
+    """The tasks APPROACH and FOLLOW.
+
+    How to call: `step(guide, frame, estimate, dt)` on each tick of such a task, `reset()` with the navigator.
+
+    Args:
+        config: of the parts.
+        mounts: where the camera is and how wide it looks.
+    """
+
+    def __init__(self, config: MarkerTaskConfig, mounts: SensorMounts) -> None:
+        self._config = config
+        self._finder = MarkerFinder(config.finder, mounts.camera_view_deg)
+        self._target = Target(config.target, mounts)
+        self._search = Search(config.search)
+        self._ball_focal = config.target.marker_radius * mounts.focal_length(640)  # m px
+        self._camera_ahead = mounts.camera[0]
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._target.reset()
+        self._search.reset()
+        self._servo = Servo()
+        self._sighting: Sighting | None = None
+        self._reason = "no picture yet"
+
+    def step(self, guide: Guide, frame: SensorFrame, estimate: BodyState, dt: float) -> MarkerWish:
+        """One tick.
+
+        Args:
+            guide: the task, its speed and distance.
+            frame: newest sensor frame; its picture is looked at where there is one.
+            estimate: where the robot is.
+            dt: s, command period.
+        """
+        self._target.remember(estimate)
+        if frame.camera is not None:
+            self._look(frame.camera)
+        time = estimate.time
+        seen = self._sighting
+        row = math.nan if seen is None else seen.row
+        wanted = servoing.camera_pitch(row, 1 if seen is None else seen.height, self._config.servoing)
+        self._servo = servoing.pitched(self._servo, wanted, dt, self._config.servoing)
+        if self._target.age(time) <= self._config.blink:
+            self._search.reset()
+            return self._lead(guide, estimate)
+        self._servo = self._servo._replace(standing=False)
+        return self._seek(estimate)
+
+    def _look(self, image: CameraImage) -> None:
+        self._sighting = self._finder.find(image)
+        self._reason = self._finder.reason
+        if self._sighting is not None and not self._target.see(self._sighting):
+            self._sighting = None
+            self._reason = "a marker is seen, but not where it can be"
+
+    def _lead(self, guide: Guide, estimate: BodyState) -> MarkerWish:
+        """The marker is in view: towards it, or stand."""
+        config = self._config.servoing
+        relative = self._target.relative(estimate)
+        if relative is None:
+            return self._seek(estimate)
+        law = servoing.follow if guide.task is GuideTask.FOLLOW else servoing.approach
+        self._servo, motion = law(self._servo, relative, guide.distance, guide.speed, config)
+        # The radius that the marker has at this distance: a missed picture does not change who leads.
+        radius = self._ball_focal / max(relative.distance, 0.05)
+        share = servoing.mixing(radius, config)
+        if self._servo.standing:
+            share = 1.0
+        goal = self._stand_off(estimate, guide.distance)
+        guided = Guided.ARRIVED if self._servo.standing else Guided.MARKER
+        mixing = share if self._sighting is not None else 0.0
+        return self._wish(estimate, guided, (motion, share, goal), mixing)
+
+    def _seek(self, estimate: BodyState) -> MarkerWish:
+        """The marker is not in view: look for it, first where it should be."""
+        place = self._target.position_at(estimate.time) if self._target.known else None
+        wish = self._search.step(estimate, place)
+        self._reason = str(wish.phase)
+        share = 0.0 if wish.motion is None else 1.0
+        return self._wish(estimate, Guided.SEARCH, (wish.motion or Motion(), share, wish.goal), 0.0)
+
+    def _stand_off(self, estimate: BodyState, distance: float) -> FloatArray:
+        """(2,) m, odometry frame: on the line to the marker, where the trunk is at the wanted distance."""
+        marker = self._target.position_at(estimate.time)[:2]
+        way = marker - estimate.position[:2]
+        far = float(np.hypot(*way))
+        return np.asarray(marker - way * min(1.0, (distance + self._camera_ahead) / max(far, 1e-6)))
+
+    def _wish(
+        self, estimate: BodyState, guided: Guided, lead: tuple[Motion, float, FloatArray | None],
+        mixing: float,
+    ) -> MarkerWish:  # fmt: skip
+        seen = self._sighting
+        marker = np.full(3, np.nan) if seen is None else np.array([seen.column, seen.row, seen.radius])
+        return MarkerWish(
+            guided=guided, motion=lead[0], share=lead[1], goal=lead[2], pitch=self._servo.pitch,
+            mixing=mixing, marker=marker, position=self._target.position_at(estimate.time),
+            age=self._target.age(estimate.time), reason="" if guided is Guided.ARRIVED else self._reason,
+        )  # fmt: skip
