@@ -116,6 +116,8 @@ class RenderedCamera:
             self._model, self._data, self._option, None, self._view, everything, self._scene
         )
         self._aim()
+        # The light at the camera, where the camera is now.
+        mujoco.mjv_makeLights(self._model, self._data, self._scene)
         mujoco.mjr_render(self._rectangle, self._scene, self._renderer)
         mujoco.mjr_readPixels(self._drawn, None, self._rectangle, self._renderer)
         # The graphics library counts rows from below.

@@ -13,6 +13,7 @@ from bluefoot_mpc.model.parameters import GRAVITY, RobotParameters
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.sim.config import OPEN_WORLDS, SensorConfig, SimConfig, WorldConfig
 from bluefoot_mpc.sim.randomization import Draw
+from bluefoot_mpc.sim.scenery import add_scenery
 from bluefoot_mpc.sim.terrain import add_ground
 from bluefoot_mpc.sim.worlds.build import FLOOR_GROUP, THING_GROUP, add_plan
 from bluefoot_mpc.sim.worlds.plan import WorldPlan
@@ -74,6 +75,8 @@ def build_world(robot: RobotModel, config: SimConfig, draw: Draw, plan: WorldPla
     _set_options(spec, config)
     try:
         _add_world(spec, config.world, plan)
+        if config.camera.enabled:
+            add_scenery(spec, config.world.name in OPEN_WORLDS or plan is not None)
         model = spec.compile()
     except ValueError as error:
         raise ConfigurationError(f"world '{config.world.name}': {error}") from error
