@@ -70,6 +70,14 @@ def outline(solid: Solid) -> FloatArray:
     )
 
 
+def are_apart(one: Solid, other: Solid, least: float) -> bool:
+    """True where two solids seen from above keep a distance (m) of each other."""
+    between = math.hypot(one.x - other.x, one.y - other.y)
+    if between - 0.5 * (math.hypot(*one.size[:2]) + math.hypot(*other.size[:2])) >= least:
+        return True
+    return gap(one, other) >= least
+
+
 def gap(one: Solid, other: Solid) -> float:
     """Distance between two solids seen from above, m, to about a millimetre; negative where they overlap."""
     return float(min(distance(outline(one), other).min(), distance(outline(other), one).min()))

@@ -8,11 +8,23 @@ import numpy as np
 
 from bluefoot_mpc.sim.config import PLANNED_WORLDS, WorldConfig
 from bluefoot_mpc.sim.randomization import stream
+from bluefoot_mpc.sim.worlds.corridors import corridors
+from bluefoot_mpc.sim.worlds.furniture import chairs
+from bluefoot_mpc.sim.worlds.hiding import hidden
 from bluefoot_mpc.sim.worlds.layout import Layout
+from bluefoot_mpc.sim.worlds.mazes import dead_ends, maze
 from bluefoot_mpc.sim.worlds.plan import WorldPlan
 from bluefoot_mpc.sim.worlds.rooms import arena, room
 
-KINDS: Mapping[str, Callable[[np.random.Generator], Layout]] = {"room": room, "arena": arena}
+KINDS: Mapping[str, Callable[[np.random.Generator], Layout]] = {
+    "room": room,
+    "corridors": corridors,
+    "chairs": chairs,
+    "maze": maze,
+    "dead_ends": dead_ends,
+    "hidden": hidden,
+    "arena": arena,
+}
 """What makes the layout of each kind of world."""
 
 

@@ -6,7 +6,19 @@ import math
 
 import numpy as np
 
-from bluefoot_mpc.sim.worlds.layout import PASSAGE, WALL, Bounds, Colour, Layout, box, cylinder, pick
+from bluefoot_mpc.sim.worlds.layout import (
+    PARTITION,
+    PASSAGE,
+    WALL,
+    Bounds,
+    Colour,
+    Layout,
+    Point,
+    box,
+    cylinder,
+    pick,
+    wall,
+)  # fmt: skip
 from bluefoot_mpc.sim.worlds.plan import Solid
 
 NEAR_MARKER: Colour = (0.80, 0.22, 0.52)
@@ -15,7 +27,7 @@ NEAR_MARKER: Colour = (0.80, 0.22, 0.52)
 ARENA_FREE: Bounds = (-1.0, -1.9, 4.4, 1.9)
 """m, least x, least y, greatest x, greatest y: nothing stands here in the arena, whatever the seed."""
 
-_TRIES = 200
+_TRIES = 100
 
 
 def room(rng: np.random.Generator) -> Layout:
@@ -32,9 +44,9 @@ def room(rng: np.random.Generator) -> Layout:
 def arena(rng: np.random.Generator) -> Layout:
     """A big room, free in the middle, things along its walls, one wall nearly of the marker's colour."""
     x0, y0, x1, y1 = ARENA_FREE
-    room_left, room_ahead = rng.uniform(0.9, 1.2), rng.uniform(0.9, 1.2)
+    room_left, room_ahead = float(rng.uniform(0.9, 1.2)), float(rng.uniform(0.9, 1.2))
     side = rng.uniform(0.9, 1.2, 2)
-    layout = Layout(_rounded((x0 - room_left, y0 - side[0], x1 + room_ahead, y1 + side[1])))
+    layout = Layout((x0 - room_left, y0 - float(side[0]), x1 + room_ahead, y1 + float(side[1])))
     colours = [WALL] * 4
     colours[int(rng.integers(4))] = NEAR_MARKER
     layout.enclose(colours)
@@ -45,14 +57,14 @@ def arena(rng: np.random.Generator) -> Layout:
 
 def some_bounds(rng: np.random.Generator, length: tuple[float, float], width: tuple[float, float]) -> Bounds:
     """A rectangle with the origin somewhere inside, at least 1.1 m from its sides; either way round."""
-    sizes = [rng.uniform(*length), rng.uniform(*width)]
+    sizes = [float(rng.uniform(*length)), float(rng.uniform(*width))]
     if rng.random() < 0.5:
         sizes.reverse()
-    low = [-rng.uniform(1.1, size - 1.1) for size in sizes]
-    return _rounded((low[0], low[1], low[0] + sizes[0], low[1] + sizes[1]))
+    low = [-float(rng.uniform(1.1, size - 1.1)) for size in sizes]
+    return low[0], low[1], low[0] + sizes[0], low[1] + sizes[1]
 
 
-def random_point(layout: Layout, rng: np.random.Generator, margin: float) -> tuple[float, float]:
+def random_point(layout: Layout, rng: np.random.Generator, margin: float) -> Point:
     """A point within the bounds, m in world.
 
     Args:
@@ -70,7 +82,7 @@ def add_cylinder(layout: Layout, rng: np.random.Generator) -> bool:
     name, colour, height = layout.name("cylinder"), pick(rng), float(rng.uniform(0.4, 0.6))
     for _ in range(_TRIES):
         thing = cylinder(name, random_point(layout, rng, radius + PASSAGE), radius, height, colour)
-        if layout.has_room([thing]):
+        if layout.has_room([thing], by_walls=True):  # it is far enough from them already
             layout.add(thing)
             return True
     return False
@@ -79,6 +91,7 @@ def add_cylinder(layout: Layout, rng: np.random.Generator) -> bool:
 def add_stub(layout: Layout, rng: np.random.Generator) -> bool:
     """Put a short wall that begins at an outer wall; False where there was no room for it."""
     x0, y0, x1, y1 = layout.bounds
+    name = layout.name("partition")
     for _ in range(_TRIES):
         length = float(rng.uniform(0.8, 1.4))
         x, y = random_point(layout, rng, PASSAGE + 0.1)
@@ -88,22 +101,11 @@ def add_stub(layout: Layout, rng: np.random.Generator) -> bool:
             ((x0, y), (x0 + length, y)),
             ((x1, y), (x1 - length, y)),
         )[int(rng.integers(4))]
-        trial = Layout(layout.bounds)
-        stub = trial.partition(start, end)
-        others = [solid for solid in layout.solids if not solid.name.startswith("wall")]
-        free = Layout(layout.bounds)
-        free.add(*others)
-        if free.has_room([stub]) and _end_has_room(layout, end):
-            layout.partition(start, end)
+        stub = wall(name, start, end, PARTITION)
+        if layout.has_room([stub], by_walls=True):
+            layout.add(stub)
             return True
     return False
-
-
-def _end_has_room(layout: Layout, end: tuple[float, float]) -> bool:
-    """True where the end of a wall is a passage away from at least three outer walls, and its own."""
-    x0, y0, x1, y1 = layout.bounds
-    near = [gap < PASSAGE + 0.1 for gap in (end[0] - x0, x1 - end[0], end[1] - y0, y1 - end[1])]
-    return sum(near) <= 1
 
 
 def _add_along_wall(layout: Layout, rng: np.random.Generator) -> bool:
@@ -123,9 +125,7 @@ def _add_along_wall(layout: Layout, rng: np.random.Generator) -> bool:
             if kind == "cylinder"
             else box(name, at, (2.0 * half, 2.0 * half, height), 0.0, colour)
         )
-        things = Layout(layout.bounds)
-        things.add(*(solid for solid in layout.solids if not solid.name.startswith("wall")))
-        if things.has_room([thing]) and _outside(thing, ARENA_FREE):
+        if layout.has_room([thing], by_walls=True) and _outside(thing, ARENA_FREE):
             layout.add(thing)
             return True
     return False
@@ -136,8 +136,3 @@ def _outside(thing: Solid, bounds: Bounds) -> bool:
     x0, y0, x1, y1 = bounds
     away = np.hypot(max(x0 - thing.x, 0.0, thing.x - x1), max(y0 - thing.y, 0.0, thing.y - y1))
     return bool(away >= reach)
-
-
-def _rounded(bounds: Bounds) -> Bounds:
-    x0, y0, x1, y1 = (round(float(value), 3) for value in bounds)
-    return x0, y0, x1, y1
