@@ -38,7 +38,7 @@ class MarkerConfig:
     least_support: float = 0.72  # share of the outline in sight where an edge fits
     least_merged_support: float = 0.62  # the same before something of the marker's colour
     greatest_residual: float = 0.035  # of the radius, mean distance of the edge from the fit
-    rays: int = 64  # directions from the middle along which the edge is looked for
+    rays: int = 48  # directions from the middle along which the edge is looked for
     candidates: int = 5  # patches of the colour that are examined, largest first
 
     def __post_init__(self) -> None:

@@ -147,7 +147,8 @@ def cut(pixels: Any, blob: Blob, colour: ColourRange) -> Patch:
 def contour_circle(patch: Patch) -> Circle | None:
     """The circle on which most of the patch's contour lies; None where there is none.
 
-    What an obstacle or the picture's edge cuts off may miss. Circles through three points each are tried and scored by the contour's length on them.
+    What an obstacle or the picture's edge cuts off may miss. Circles through three points each are tried and
+    scored by the contour's length on them.
     """
     points = _contour(patch)
     if len(points) < 8:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bluefoot_mpc.navigation.marker_colour import Circle, Patch
 from bluefoot_mpc.types import BoolArray, FloatArray
 
-WINDOWS = (0.25, 0.14, 0.10)
+WINDOWS = (0.25, 0.10)
 """Of the angular radius: how far from the expected edge it is looked for, on each pass."""
 LEAST_WINDOW = 2.5
 """Pixels of the patch, the same for small balls."""
@@ -29,6 +29,8 @@ INSIDE = (0.45, 0.65, 0.82)
 """Of the angular radius: where the marker's colour must be, on a ray that counts."""
 OUTSIDE = 1.25
 """Of the angular radius: where it should not be; else something of the same colour is behind."""
+REWEIGHTED = 3
+"""Rounds of least squares in which what is far off loses its weight."""
 TOLERANCE = 0.05
 """Of the angular radius: how far from the fit an edge supports it (and always within 0.8 pixels)."""
 
@@ -149,13 +151,13 @@ class Rim:
 
     def place(self, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Column and row in the whole picture, (rays, k) each, of (k,) or (rays, k) angles from the axis."""
-        angle = np.broadcast_to(angle, (len(self.phase), angle.shape[-1]))[..., None]
-        direction = np.cos(angle) * self.cone.axis + np.sin(angle) * self._outwards[:, None, :]
-        depth = np.maximum(direction[..., 2], 1e-3)
-        return (
-            self.lens.column + self.lens.focal * direction[..., 0] / depth,
-            self.lens.row + self.lens.focal * direction[..., 1] / depth,
-        )
+        # Of a direction cos(angle) axis + sin(angle) outwards only the ratio matters: a tangent for both.
+        slope = np.tan(angle)
+        across, down, ahead = (
+            self.cone.axis[k] + slope * self._outwards[:, k : k + 1] for k in range(3)
+        )  # (rays, k) each
+        reach = self.lens.focal / np.maximum(ahead, 1e-3)
+        return self.lens.column + reach * across, self.lens.row + reach * down
 
     def sample(self, values: NDArray[np.uint8], angle: FloatArray) -> Any:
         """(rays, k, ...) float32 values of the patch at angles from the axis."""
@@ -228,7 +230,7 @@ def _shift(edge: Edge, phase: FloatArray, angle: float) -> FloatArray | None:
     offset = edge.angle[use] - angle
     weight = np.ones(len(offset))
     shift = np.zeros(3)
-    for _ in range(4):
+    for _ in range(REWEIGHTED):
         weighted = rows * weight[:, None]
         normal = weighted.T @ rows + 1e-6 * np.eye(3)
         shift = np.linalg.solve(normal, weighted.T @ offset)
