@@ -9,7 +9,7 @@ import importlib
 import math
 import threading
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from bluefoot_mpc.exceptions import DeviceError
 from bluefoot_mpc.io.clock import Clock, MonotonicClock
@@ -39,6 +39,26 @@ class CameraConfig:
             width=self.width, height=self.height, rate=self.rate, silence=self.silence, retry=self.retry
         )
         require_nonnegative(delay=self.delay)
+
+
+class PictureSource(Protocol):
+    """What a robot asks of its camera, real or emulated."""
+
+    def open(self) -> None:
+        """Begin to take pictures; returns at once."""
+        ...
+
+    def take(self) -> CameraImage | None:
+        """The newest picture, if it is newer than at the last call; never waits."""
+        ...
+
+    def findings(self) -> tuple[Finding, ...]:
+        """The camera's part of a check."""
+        ...
+
+    def close(self) -> None:
+        """Give the camera back. Idempotent, never raises."""
+        ...
 
 
 class Camera:

@@ -26,6 +26,7 @@ from bluefoot_mpc.io.servo_robot.making import BOARD_BAUD, LIDAR_BAUD, drivers
 from bluefoot_mpc.io.servo_robot.robot import ServoRobot
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.scenarios.config import Resolved
+from bluefoot_mpc.scenarios.emulated_camera import EmulatedCamera
 from bluefoot_mpc.scenarios.robots import RunRobot
 from bluefoot_mpc.sim.body import Posture
 from bluefoot_mpc.sim.config import SimConfig
@@ -89,7 +90,7 @@ class PlantLidar:
 
     def scan(self, time: float) -> ArrayLike:
         """(682,) mm of a sweep that ends at `time` (s)."""
-        self._plant.advance(time)
+        self._plant.face(time)
         return self._lidar.scan(time)
 
 
@@ -157,16 +158,15 @@ def emulate(
         plant=plant,
         lines=(line,),
         board=EmulatedBoard(PlantBoard(plant, (line,))),
-        lidar=_lidar(model, plant, seed) if config.emulate_lidar else None,
+        lidar=_lidar(model, plant, seed) if config.emulate_lidar or sim.lidar.enabled else None,
         faults=FaultPlan.load(Path(config.faults)) if config.faults else FaultPlan(),
     )
 
 
 def _lidar(model: RobotModel, plant: SimPlant, seed: int) -> EmulatedLidar:
-    mount = model.parameters.sensors.lidar
-    return EmulatedLidar(
-        PlantLidar(plant, RaycastLidar(plant.model, plant.data, plant.trunk, mount, seed=seed))
-    )
+    mount, errors = model.parameters.sensors.lidar, plant.config.lidar
+    lidar = RaycastLidar(plant.model, plant.data, plant.trunk, mount, errors, seed)
+    return EmulatedLidar(PlantLidar(plant, lidar))
 
 
 def make_emulated(resolved: Resolved, model: RobotModel, sitting: Posture, paced: bool) -> RunRobot:
@@ -185,7 +185,10 @@ def make_emulated(resolved: Resolved, model: RobotModel, sitting: Posture, paced
     board = SensorBoard(MemoryLink(parts.board_device(), clock, BOARD_BAUD, "emulated board"), clock)
     lidar = parts.lidar_device()
     scanner = None if lidar is None else Lidar(MemoryLink(lidar, clock, LIDAR_BAUD, "emulated LIDAR"), clock)
-    devices = drivers(servos, clock, Calibration.nominal(model.parameters), board, lidar=scanner)
+    camera = EmulatedCamera(parts.plant, clock) if resolved.stages.sim.camera.enabled else None
+    devices = drivers(
+        servos, clock, Calibration.nominal(model.parameters), board, lidar=scanner, camera=camera
+    )
     robot = ServoRobot(devices, clock, config)
     return RunRobot(
         robot=robot, truth=parts.plant.truth, drawn=parts.plant.drawn, devices=parts.report, parts=parts

@@ -11,7 +11,7 @@ from typing import Any
 
 import orjson
 
-from bluefoot_mpc.exceptions import DeviceError, LogError
+from bluefoot_mpc.exceptions import ConfigurationError, DeviceError, LogError
 from bluefoot_mpc.io.calibration import Calibration
 from bluefoot_mpc.io.clock import MonotonicClock
 from bluefoot_mpc.model.robot import RobotModel
@@ -113,8 +113,14 @@ def start_emulator(resolved: Resolved, model: RobotModel, sitting: Posture, zero
         zero: s on the machine's monotonic clock that count as zero.
 
     Raises:
+        ConfigurationError: it is to have a camera.
         DeviceError: it did not start.
     """
+    if resolved.stages.sim.camera.enabled:
+        raise ConfigurationError(
+            "an emulated robot that is reached through ports has no camera: its pictures have no port to"
+            " come through. Leave --link pty out, or run without a camera (--set sim.camera.enabled=false)"
+        )
     return EmulatorProcess(
         Order(
             model=to_table(model.parameters), sim=to_table(resolved.stages.sim),

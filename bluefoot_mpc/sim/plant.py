@@ -11,13 +11,16 @@ import math
 from collections import deque
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 
 from bluefoot_mpc.io.emulation.shafts import ShaftDrive, ShaftState
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.sim.body import Posture, SimBody
 from bluefoot_mpc.sim.config import SimConfig
-from bluefoot_mpc.types import BoolArray, ImuBatch, SensorFrame, TruthSample
+from bluefoot_mpc.sim.sight import Sight
+from bluefoot_mpc.sim.sight_config import LidarConfig
+from bluefoot_mpc.types import BoolArray, CameraImage, ImuBatch, SensorFrame, TruthSample
 
 _KEPT = 400
 """Samples of the inertial sensor that wait for a board: two seconds."""
@@ -28,7 +31,8 @@ class SimPlant(SimBody):
     """BlueFoot in MuJoCo, limp in a posture until its shafts are driven.
 
     Compliance margin and punch are the parameter file's; slope, goal, speed and
-    torque limit are the registers'.
+    torque limit are the registers'. A LIDAR that somebody puts on the trunk asks for
+    its scans itself; the camera's pictures are taken when they are due.
 
     Args:
         robot: the robot's model.
@@ -44,6 +48,8 @@ class SimPlant(SimBody):
         self._sampled: deque[SensorFrame] = deque(maxlen=_KEPT)
         self._powers: list[float] = []
         self._zero = 0.0
+        camera_alone = replace(config, lidar=LidarConfig())
+        self._sight = Sight(self._world, robot.parameters.sensors, camera_alone, seed)
         self._frame = self.reset()
 
     def reset(self) -> SensorFrame:
@@ -54,10 +60,12 @@ class SimPlant(SimBody):
         self._step = -settle
         self._inertial.begin(self._pose, self._twist)
         self._sampled.clear()
+        self._sight.reset()
         while self._step < 0:
             self._bank.cool()
             self._frame = self._run_frame()
         self._start_clock()
+        self._next_event = min(self._next_event, self._sight.due)
         self._powers.clear()
         self._truth.start_frame()
         return self._frame
@@ -136,6 +144,20 @@ class SimPlant(SimBody):
         """A out of the pack, the same mean."""
         return self._powers[-1] / self._frame.voltage if self._powers else 0.0
 
+    def face(self, time: float) -> None:
+        """Let the physics pass until `time` (s), and have every position of that instant worked out."""
+        self.advance(time)
+        mujoco.mj_kinematics(self._world.model, self._world.data)
+
+    def picture(self) -> CameraImage | None:
+        """The newest picture of the camera that has arrived, once; None without one."""
+        image = self._sight.take(self._step)[1]
+        return replace(image, time=image.time + self._zero) if image is not None and self._zero else image
+
+    def close(self) -> None:
+        """Give the camera's graphics memory back. Idempotent."""
+        self._sight.close()
+
     def truth(self) -> TruthSample:
         """The true state now, with the mean power and all touches since it was last asked for."""
         if self._powers:
@@ -144,6 +166,12 @@ class SimPlant(SimBody):
         sample = super().truth()
         self._truth.start_frame()
         return replace(sample, time=sample.time + self._zero) if self._zero else sample
+
+    def _handle_events(self, step: int) -> None:
+        super()._handle_events(step)
+        if step >= self._sight.due:
+            self._sight.look(step)
+        self._next_event = min(self._next_event, self._sight.due)
 
     def _finish_window(self) -> None:
         self._require_stable()

@@ -88,9 +88,11 @@ class Sight:
         return self._scan is not None or bool(self._arriving)
 
     def close(self) -> None:
-        """Give the graphics memory back. Idempotent."""
+        """Give the graphics memory back; there are no more pictures. Idempotent."""
         if self._camera is not None:
             self._camera.close()
+            self._camera = None
+            self._plan()
 
     def _plan(self) -> None:
         self._scan_due = round(self._scans * self._scan_steps) if self._lidar is not None else NEVER

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from bluefoot_mpc.io.board.driver import SensorBoard
 from bluefoot_mpc.io.calibration import Calibration
-from bluefoot_mpc.io.camera import Camera
+from bluefoot_mpc.io.camera import PictureSource
 from bluefoot_mpc.io.dynamixel.bus import ServoBus
 from bluefoot_mpc.io.dynamixel.cycle import BusCycle
 from bluefoot_mpc.io.dynamixel.layout import ServoLayout
@@ -34,5 +34,5 @@ class Devices:
     calibration: Calibration
     board: SensorBoard | None = None
     lidar: Lidar | None = None
-    camera: Camera | None = None
+    camera: PictureSource | None = None
     model: str = "bluefoot"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from bluefoot_mpc.io.board.driver import SensorBoard
 from bluefoot_mpc.io.calibration import Calibration
-from bluefoot_mpc.io.camera import Camera
+from bluefoot_mpc.io.camera import PictureSource
 from bluefoot_mpc.io.clock import Clock
 from bluefoot_mpc.io.dynamixel.bus import BusConfig, ServoBus
 from bluefoot_mpc.io.dynamixel.cycle import BusCycle
@@ -29,7 +29,7 @@ def drivers(
     board: SensorBoard | None = None,
     *,
     lidar: Lidar | None = None,
-    camera: Camera | None = None,
+    camera: PictureSource | None = None,
     model: str = "bluefoot",
     bus: BusConfig | None = None,
 ) -> Devices:
