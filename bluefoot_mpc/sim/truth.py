@@ -9,9 +9,11 @@ import casadi as ca
 import mujoco
 import numpy as np
 
+from bluefoot_mpc.sim.clearance import Surroundings
 from bluefoot_mpc.sim.servo import ServoBank
 from bluefoot_mpc.sim.terrain import Ground
 from bluefoot_mpc.sim.world import World
+from bluefoot_mpc.sim.worlds.build import MARKER_GEOM
 from bluefoot_mpc.types import N_JOINTS, N_LEGS, FloatArray, TruthSample
 
 _ENDS = np.cumsum([0, 23, 22, 3, 6, 3 * N_LEGS, N_LEGS, 3 * N_LEGS, N_JOINTS, N_JOINTS, N_JOINTS]).tolist()
@@ -30,6 +32,9 @@ class TruthReader:
         self.power = 0.0
         self._world, self._ground, self._bank, self._radius = world, ground, bank, foot_radius
         self._touched: set[str] = set()
+        self._surroundings = Surroundings(world.model, world.data, world.trunk)
+        self._hit: set[str] = set()
+        self._marker = mujoco.mj_name2id(world.model, mujoco.mjtObj.mjOBJ_GEOM, MARKER_GEOM)
         self._harmless = {geom for geom, name in enumerate(world.body_of_part) if not name}
         # Contacts of each foot in the last step with sensors.
         self._found = world.data.sensordata[world.sensor + 3 : world.sensor + 3 + 4 * N_LEGS : 4]
@@ -39,14 +44,20 @@ class TruthReader:
     def start_frame(self) -> None:
         """Forget what was touched in the last frame."""
         self._touched.clear()
+        self._hit.clear()
 
     def look_for_contacts(self) -> None:
-        """Note which bodies other than feet touch the world in this physics step, one with sensors."""
+        """Note which bodies other than feet touch the world in this physics step, and what is no floor.
+
+        The step must be one with sensors.
+        """
         data = self._world.data
         # The feet count their own: most of the time there are no others.
         if data.ncon != sum(self._found.tolist()):
             others = set(data.contact.geom.ravel().tolist()) - self._harmless
             self._touched.update(self._world.body_of_part[geom] for geom in others)
+        if self._surroundings.exist:
+            self._hit.update(self._surroundings.touched())
 
     def read(self, time: float, force: FloatArray) -> TruthSample:
         """The truth at the end of the last physics step; contact forces are that step's.
@@ -82,6 +93,9 @@ class TruthReader:
             voltage=float(bank.voltage[0]),
             touching=tuple(sorted(self._touched)) if self._touched else (),
             external_force=force.copy(),
+            clearance=self._surroundings.clearance(),
+            collisions=tuple(sorted(self._hit)) if self._hit else (),
+            marker=data.geom_xpos[self._marker].copy() if self._marker >= 0 else np.full(3, np.nan),
         )
 
     def _connect(self) -> tuple[Any, Any]:
