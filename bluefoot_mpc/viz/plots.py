@@ -23,6 +23,23 @@ Trace = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
+class Step:
+    """One of several instants that a figure can show.
+
+    Attributes:
+        label: on its button.
+        note: what is special about it; shown when one points at the button.
+        time: s.
+        data: plotly traces in place of the panel's.
+    """
+
+    label: str
+    note: str
+    time: float
+    data: list[Trace]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Panel:
     """One figure of the report.
 
@@ -36,6 +53,8 @@ class Panel:
         wide: True for the full width of the page.
         time: True when x is the run's time, so that it takes part in zoom and cursor.
         window: s shown at a time, paging along with the replay; 0 shows the whole run.
+        steps: instants to choose from; `data` is what the first of them shows.
+        follows: True for a map in world coordinates, on which the replayed robot is marked.
     """
 
     key: str
@@ -47,6 +66,8 @@ class Panel:
     wide: bool = False
     time: bool = True
     window: float = 0.0
+    steps: tuple[Step, ...] = ()
+    follows: bool = False
 
 
 def curve(

@@ -11,6 +11,7 @@ from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.settings import dump_toml
 from bluefoot_mpc.viz import plots, plots_ground, plots_level, plots_machine, plots_plan
 from bluefoot_mpc.viz.animation import animation_data, viewer_script
+from bluefoot_mpc.viz.journey import journey_of
 from bluefoot_mpc.viz.level_series import extract_leveling
 from bluefoot_mpc.viz.packing import stretches
 from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
@@ -56,7 +57,9 @@ def report_html(
     stall_torque = robot.parameters.servo.stall_torque
     series = extract(run, stall_torque)
     has_ticks = len(series.time) > 0
+    journey = journey_of(run, series, robot) if has_ticks else None
     panels = _panels(run, series, stall_torque, summary.get("figures") or {}) if has_ticks else []
+    panels = [*(journey.panels if journey is not None else ()), *panels]
     judged = verdict(summary, checks)
     data = animation_data(build_scene(robot), series, robot.parameters.legs.foot_radius) if has_ticks else {}
     return render(
@@ -70,6 +73,8 @@ def report_html(
         has_truth=series.has_truth,
         plots_follow=True,
         panels=panels,
+        strip=journey.strip if journey is not None else (),
+        strip_after=journey.strip_after if journey is not None else "",
         run_data=embed_json(data),
         figures=embed_json(_figures(panels, series)),
         viewer_script=embed_script(viewer_script()) if has_ticks else "",
@@ -118,6 +123,10 @@ def _figures(panels: Sequence[Panel], series: RunSeries) -> dict[str, Any]:
             "window": panel.window,
             "full": layout["xaxis"].get("range"),
         }
+        if panel.steps:
+            figures[panel.key]["steps"] = [{"time": step.time, "data": step.data} for step in panel.steps]
+        if panel.follows:
+            figures[panel.key]["follows"] = True
     return figures
 
 

@@ -26,6 +26,27 @@ JOINT_DASHES: dict[str, str] = {"hip_yaw": "dot", "hip_pitch": "solid", "knee": 
 
 LEG_NAMES: dict[str, str] = {"FL": "front left", "FR": "front right", "RL": "rear left", "RR": "rear right"}
 
+GUIDED_COLOURS: dict[str, str] = {
+    "field": "#1283d2",
+    "marker": "#c05a9c",
+    "waypoint": "#6b5bd2",
+    "search": "#d99a00",
+    "escape": "#d1495b",
+    "arrived": "#12a17c",
+    "blind": "#8a94a6",
+}
+"""One colour for each thing that leads the robot on its own way, the same in map, bands and events."""
+
+GUIDED_NAMES: dict[str, str] = {
+    "field": "potential field",
+    "marker": "marker",
+    "waypoint": "waypoint",
+    "search": "search",
+    "escape": "way out",
+    "arrived": "arrived",
+    "blind": "blind",
+}
+
 GOOD = "#12a17c"
 WARNING = "#d99a00"
 BAD = "#d1495b"
@@ -39,6 +60,9 @@ COMMAND = "#e07020"
 ZMP = "#d1495b"
 COM = "#6b5bd2"
 SUPPORT = "#12a17c"
+LEADER = "#8a6d1f"
+MARKER = "#e61a8c"
+"""The marker's own colour, which no leg wears."""
 
 _FONTS = ["Inter", "Source Sans 3", "Helvetica Neue", "Arial", "Liberation Sans", "DejaVu Sans"]
 

@@ -35,17 +35,22 @@
   }
 
   function draw() {
-    const css = getComputedStyle(document.documentElement), colour = (name) => css.getPropertyValue(name).trim();
     for (const node of document.querySelectorAll("[data-figure]")) {
       const figure = figures[node.dataset.figure];
-      Plotly.react(node, themed(figure.data, colour), layoutFor(figure, colour), { displaylogo: false, responsive: true, modeBarButtons: [["zoom2d", "pan2d", "resetScale2d", "toImage"]] });
+      drawOne(node, figure);
       if (!node.dataset.tied) tie(node, figure);
     }
+  }
+
+  function drawOne(node, figure) {
+    const css = getComputedStyle(document.documentElement), colour = (name) => css.getPropertyValue(name).trim();
+    Plotly.react(node, themed(figure.data, colour), layoutFor(figure, colour), { displaylogo: false, responsive: true, modeBarButtons: [["zoom2d", "pan2d", "resetScale2d", "toImage"]] });
   }
 
   function tie(node, figure) {
     node.dataset.tied = "yes";
     drawn.push({ node, figure });
+    if (figure.follows) mark(node, drawn[drawn.length - 1]);
     if (!figure.time) return;
     const line = document.createElement("div");
     line.className = "cursor";
@@ -58,6 +63,56 @@
       else if (change["xaxis.autorange"]) together(node, null);
       placeCursors();
     });
+  }
+
+  // On a map the replayed robot is marked, and pressing the way goes there.
+  function mark(node, entry) {
+    const here = entry.here = document.createElement("div");
+    here.className = "here";
+    here.innerHTML = '<svg viewBox="-8 -8 16 16"><path d="M7 0L-5 -5.5L-2.5 0L-5 5.5Z"/></svg>';
+    node.appendChild(here);
+    node.on("plotly_click", (event) => {
+      const facts = event.points.length && event.points[0].customdata;
+      const t = facts ? Number(facts[0]) : NaN;
+      if (replay && Number.isFinite(t)) replay.clock.seek(t);
+    });
+    node.on("plotly_relayout", () => placeHere(entry));
+  }
+
+  function placeHere({ node, here }) {
+    const full = node._fullLayout;
+    if (!replay || !full || !full.xaxis) return;
+    const recording = replay.recording, { i } = recording.at(replay.clock.time), size = full._size;
+    const x = full.xaxis.l2p(recording.q[recording.width * i]), y = full.yaxis.l2p(recording.q[recording.width * i + 1]);
+    const visible = x >= 0 && x <= full.xaxis._length && y >= 0 && y <= full.yaxis._length;
+    here.style.display = visible ? "block" : "none";
+    here.style.left = `${full.xaxis._offset + x}px`;
+    here.style.top = `${full.yaxis._offset + y}px`;
+    here.style.transform = `rotate(${-recording.yaw(i)}rad)`;
+  }
+
+  // A figure of several instants: its buttons choose one, and take the replay there.
+  function wireSteps(row) {
+    const figure = figures[row.dataset.steps], node = document.querySelector(`[data-figure="${row.dataset.steps}"]`);
+    const buttons = [...row.querySelectorAll("[data-step]")], note = row.querySelector("[data-role=step-note]");
+    const choose = (index) => {
+      figure.data = figure.steps[index].data;
+      buttons.forEach((button, k) => button.setAttribute("aria-pressed", String(k === index)));
+      note.textContent = buttons[index].title;
+      drawOne(node, figure);
+    };
+    buttons.forEach((button, k) => {
+      button.onclick = () => { choose(k); if (replay) replay.clock.seek(figure.steps[k].time); };
+    });
+    row.addEventListener("keydown", (event) => {
+      const now = buttons.findIndex((button) => button.getAttribute("aria-pressed") === "true");
+      const next = now + ({ ArrowLeft: -1, ArrowRight: 1 }[event.key] || 0);
+      if (next === now || !buttons[next]) return;
+      event.preventDefault();
+      buttons[next].focus();
+      buttons[next].click();
+    });
+    choose(0);
   }
 
   let busy = false;
@@ -77,7 +132,9 @@
   function placeCursors() {
     if (!replay) return;
     const t = replay.clock.time;
-    for (const { node, line } of drawn) {
+    for (const entry of drawn) {
+      const { node, line } = entry;
+      if (entry.here) placeHere(entry);
       const full = node._fullLayout;
       if (!line || !full || !full.xaxis) continue;
       const inside = full.xaxis.l2p(t), size = full._size;
@@ -120,6 +177,7 @@
   }
 
   draw();
+  for (const row of document.querySelectorAll("[data-steps]")) wireSteps(row);
   dark.addEventListener("change", draw);
   addEventListener("resize", () => setTimeout(placeCursors, 60));
   if (replay) {
