@@ -13,6 +13,7 @@ from bluefoot_mpc.scenarios.leveling import Level
 from bluefoot_mpc.scenarios.navigating import Goto, Wander
 from bluefoot_mpc.scenarios.posing import Pose, Stand
 from bluefoot_mpc.scenarios.remote import Remote
+from bluefoot_mpc.scenarios.seeking import Approach, Follow
 from bluefoot_mpc.scenarios.walking import Push, Transition, Turn, Walk
 
 SHIPPED: dict[str, type[Scenario]] = {
@@ -27,6 +28,8 @@ SHIPPED: dict[str, type[Scenario]] = {
         Level,
         Wander,
         Goto,
+        Approach,
+        Follow,
         Remote,
     )
 }
