@@ -12,6 +12,7 @@ from bluefoot_mpc.exceptions import SimulationError
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.sim.config import SimConfig
 from bluefoot_mpc.sim.inertial import InertialWindows
+from bluefoot_mpc.sim.leader import Leader
 from bluefoot_mpc.sim.randomization import draw
 from bluefoot_mpc.sim.sensors import SAMPLE, Probe, Sensors
 from bluefoot_mpc.sim.servo import BankConfig, Plant, ServoBank
@@ -99,6 +100,10 @@ class SimBody:
         self._pushes: list[tuple[int, int, FloatArray]] = []
         self._force = np.zeros(3)
         self._step, self._next_event = 0, NEVER
+        self._leader = None
+        if config.leader.kind:
+            place = data.xpos[world.trunk]
+            self._leader = Leader(world.model, data, config, seed, place)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -127,7 +132,8 @@ class SimBody:
 
     def truth(self) -> TruthSample:
         """The true state now: for reports, never for a controller."""
-        return self._truth.read(self._step * self.config.physics_period, self._force)
+        sample = self._truth.read(self._step * self.config.physics_period, self._force)
+        return sample if self._leader is None else self._leader.fill(sample)
 
     def apply_push(self, force: FloatArray, duration: float) -> None:
         """Push the trunk's origin from now on.
@@ -150,6 +156,8 @@ class SimBody:
         pose[7:] = posture.joints
         self._bank.reset()
         self._sensors.reset()
+        if self._leader is not None:
+            self._leader.reset()
 
     def _start_clock(self) -> None:
         """Make this instant time zero: rested pack, cold servos, the configured pushes ahead."""
@@ -157,6 +165,8 @@ class SimBody:
         self._bank.cool()
         for push in self.config.pushes:
             self._add_push(push.time, np.array(push.force), push.duration)
+        if self._leader is not None:
+            self._leader.start()
 
     def _add_push(self, time: float, force: FloatArray, duration: float) -> None:
         start = max(self._step, round(time / self.config.physics_period))
@@ -193,7 +203,7 @@ class SimBody:
         flags = option.disableflags & ~_SENSORS_OFF
         quiet = flags | _SENSORS_OFF
         option.disableflags = quiet
-        period, count = self._imu_steps, 0
+        period, count, leader = self._imu_steps, 0, self._leader
         for step in range(self._step + 1, self._step + steps + 1):
             if step > self._next_event:
                 self._handle_events(step - 1)
@@ -207,6 +217,8 @@ class SimBody:
             self._inertial.mark(count, self._pose, self._twist)
             self._samples[count] = self._sample
             self._truth.look_for_contacts()
+            if leader is not None:
+                leader.step()
             count += 1
         first = self._step // period * period + period
         self._step += steps

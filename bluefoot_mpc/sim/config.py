@@ -9,6 +9,7 @@ from typing import Literal
 
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.settings import require_finite, require_nonnegative, require_positive, require_range
+from bluefoot_mpc.sim.leader_config import LeaderConfig
 from bluefoot_mpc.sim.sight_config import CameraConfig, LidarConfig
 
 OPEN_WORLDS = ("flat", "rough", "slope", "steps")
@@ -180,6 +181,7 @@ class SimConfig:
     lidar: LidarConfig = field(default_factory=LidarConfig)
     camera: CameraConfig = field(default_factory=CameraConfig)
     world: WorldConfig = field(default_factory=WorldConfig)
+    leader: LeaderConfig = field(default_factory=LeaderConfig)
     randomization: RandomizationConfig = field(default_factory=RandomizationConfig)
     pushes: tuple[PushConfig, ...] = ()
 

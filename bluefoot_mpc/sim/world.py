@@ -12,6 +12,7 @@ from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.model.parameters import GRAVITY, RobotParameters
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.sim.config import OPEN_WORLDS, SensorConfig, SimConfig, WorldConfig
+from bluefoot_mpc.sim.leader_body import add_leader
 from bluefoot_mpc.sim.randomization import Draw
 from bluefoot_mpc.sim.scenery import add_scenery
 from bluefoot_mpc.sim.terrain import add_ground
@@ -75,6 +76,7 @@ def build_world(robot: RobotModel, config: SimConfig, draw: Draw, plan: WorldPla
     _set_options(spec, config)
     try:
         _add_world(spec, config.world, plan)
+        add_leader(spec, config.leader, config.visuals)
         if config.camera.enabled:
             add_scenery(spec, config.world.name in OPEN_WORLDS or plan is not None)
         model = spec.compile()
