@@ -19,7 +19,7 @@ from bluefoot_mpc.cli.station_operator import HELP, Operator
 from bluefoot_mpc.cli.teleop import Teleop, TeleopConfig
 from bluefoot_mpc.cli.terminal import Keyboard, raw_terminal
 from bluefoot_mpc.io.station.ground import GroundLink, OperatorLog
-from bluefoot_mpc.io.station.ground_end import Order
+from bluefoot_mpc.io.station.orders import Order
 from bluefoot_mpc.model.robot import load_robot
 from bluefoot_mpc.viz.station_server import StationServer
 from bluefoot_mpc.viz.station_view import StationView, station_page

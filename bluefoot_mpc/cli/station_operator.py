@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from bluefoot_mpc.cli.teleop import GAITS, Teleop, TeleopState, Vector3
 from bluefoot_mpc.io.station.ground import GroundLink
-from bluefoot_mpc.io.station.ground_end import Order
+from bluefoot_mpc.io.station.orders import Order
 from bluefoot_mpc.types import Mode, MotionCommand
 
 PAGE_TIMEOUT = 0.4

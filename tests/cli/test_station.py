@@ -18,8 +18,8 @@ from bluefoot_mpc.cli.station_arguments import StationCommand
 from bluefoot_mpc.cli.station_operator import PAGE_TIMEOUT, Operator
 from bluefoot_mpc.cli.teleop import Teleop
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.io.station.ground_end import Order
 from bluefoot_mpc.io.station.link import StationLink
+from bluefoot_mpc.io.station.orders import Order
 from bluefoot_mpc.types import Mode
 
 pytestmark = pytest.mark.slow

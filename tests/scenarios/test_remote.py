@@ -11,7 +11,7 @@ import pytest
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.io.link import LinkError
 from bluefoot_mpc.io.station.client import RemoteRobot
-from bluefoot_mpc.io.station.ground_end import Order
+from bluefoot_mpc.io.station.orders import Order
 from bluefoot_mpc.io.station.steps import Steps
 from bluefoot_mpc.scenarios import RunOptions, run, runner
 from bluefoot_mpc.scenarios.robots import make_robot

@@ -61,7 +61,7 @@ class CommandWatchdog:
             return command
         if age <= config.stand_after:
             self.notice = f"no command for {config.rest_after:g} s: no velocity"
-            return replace(command, velocity=np.zeros(2), yaw_rate=0.0)
+            return replace(command, velocity=np.zeros(2), yaw_rate=0.0, guide=None)
         if age <= config.sit_after:
             self.notice = f"no command for {config.stand_after:g} s: stand"
             return MotionCommand(mode=_tamer(command.mode, Mode.STAND), gait=command.gait)

@@ -22,7 +22,7 @@ from bluefoot_mpc.exceptions import DeviceError
 from bluefoot_mpc.io.link import LinkLostError
 from bluefoot_mpc.io.station.config import StationConfig
 from bluefoot_mpc.io.station.ground import GroundLink, OperatorLog
-from bluefoot_mpc.io.station.ground_end import Order
+from bluefoot_mpc.io.station.orders import Order
 from bluefoot_mpc.io.station.picture import RobotPicture
 from bluefoot_mpc.io.station.steps import Steps
 from bluefoot_mpc.types import MotionCommand

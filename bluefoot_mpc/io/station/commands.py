@@ -4,6 +4,9 @@ Sticks are executed as the median of the last three of each axis (zero for all
 counts at once): a frame of noise that passes the 16-bit sum by luck, which one
 in 65 536 does, is alone among true ones and moves nothing. Commands whose
 unused parameters are not zero, or whose values mean nothing, are refused.
+
+A task for which the robot finds its own way (see `tasks`) holds like a mode.
+Whatever a person does by hand ends it: sticks moved, another mode, a stop.
 """
 
 from __future__ import annotations
@@ -17,22 +20,25 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import common as mavlink
 
-from bluefoot_mpc.io.station.config import StationConfig, StickScale
-from bluefoot_mpc.io.station.protocol import CAN_BE_ASKED, FORCE, GAITS, MODES, Axis
-from bluefoot_mpc.types import Mode, MotionCommand, TrunkPose
+from bluefoot_mpc.io.station import tasks
+from bluefoot_mpc.io.station.config import StationConfig
+from bluefoot_mpc.io.station.protocol import (
+    ACCEPTED,
+    CAN_BE_ASKED,
+    DENIED,
+    FORCE,
+    GAITS,
+    MODES,
+    UNSUPPORTED,
+)
+from bluefoot_mpc.io.station.sticks import Sticks, read_sticks
+from bluefoot_mpc.io.station.tasks import TaskBoard
+from bluefoot_mpc.types import FloatArray, Mode, MotionCommand, Telemetry, TrunkPose
 
-FULL = 1000
-"""Full travel of an axis of MANUAL_CONTROL."""
-Sticks = tuple[float, float, float, float, float, float, float]
-"""Forward, left, turn left, roll, pitch, yaw, height; each -1..1."""
 _CENTRE: Sticks = (0.0,) * 7
 _MEDIAN_OF = 3
-
-ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
-DENIED = int(mavlink.MAV_RESULT_DENIED)
-UNSUPPORTED = int(mavlink.MAV_RESULT_UNSUPPORTED)
-IN_PROGRESS = int(mavlink.MAV_RESULT_IN_PROGRESS)
-FAILED = int(mavlink.MAV_RESULT_FAILED)
+_STUTTER = 0.25
+"""s; after a longer silence the robot may have let go of its task, and begins it anew."""
 
 
 @dataclass(slots=True)
@@ -58,6 +64,12 @@ class CommandInbox:
         config: scales and times.
         start: s, from when commands count as missing.
         on_emergency: called at once, with a reason.
+
+    Attributes:
+        wishes: besides motion.
+        mode: asked for.
+        gait: asked for.
+        tasks: waypoints, and what the robot is to find its own way for.
     """
 
     config: StationConfig
@@ -66,6 +78,7 @@ class CommandInbox:
     wishes: Wishes = field(default_factory=Wishes)
     mode: Mode = Mode.STAND
     gait: str = GAITS[1]
+    tasks: TaskBoard = field(default_factory=TaskBoard)
     _sticks: deque[Sticks] = field(default_factory=lambda: deque([_CENTRE] * _MEDIAN_OF, _MEDIAN_OF))
     _last_sticks: float = -math.inf
     _last_heartbeat: float = -math.inf
@@ -97,12 +110,17 @@ class CommandInbox:
             self._sticks.extend([_CENTRE] * _MEDIAN_OF)
             if self.mode is Mode.WALK:
                 # Whoever comes back must not find the robot walking off.
+                self.tasks.pause()
                 self.mode = Mode.STAND
                 remark = f"no command for {silence:.1f} s: standing; ask to walk again"
+        elif silence > _STUTTER:
+            self.tasks.shorten()
         if any(sticks):
             self._sticks.append(sticks)
         else:
             self._sticks.extend([_CENTRE] * _MEDIAN_OF)
+        if any(abs(share) > self.config.hand for share in self._held()[:3]) and self.tasks.pause():
+            remark = "moved by hand: the robot does not find its own way any more"
         self._settle()
         return remark
 
@@ -128,7 +146,7 @@ class CommandInbox:
         ):
             if message.command == number:
                 return action(parameters)
-        return UNSUPPORTED
+        return self._lead(message.command, parameters) if message.command in tasks.ORDERS else UNSUPPORTED
 
     def _arm_disarm(self, parameters: list[float]) -> int | None:
         arm, force, *unused = parameters
@@ -153,7 +171,7 @@ class CommandInbox:
         mode = MODES[int(wanted)]
         if mode not in CAN_BE_ASKED:
             return DENIED
-        if mode is not self.mode:
+        if mode is not self.mode or self.tasks.guide is not None:
             self.halt(mode)
         self.gait = GAITS[int(gait)] or self.gait
         self._settle()
@@ -161,10 +179,40 @@ class CommandInbox:
 
     def _pause(self, parameters: list[float]) -> int:
         go_on, *unused = parameters
-        if any(unused) or go_on != 0.0:
+        if any(unused) or go_on not in (0.0, 1.0):
             return DENIED
+        if go_on:
+            return self._lead(int(mavlink.MAV_CMD_DO_PAUSE_CONTINUE), parameters)
         self.halt(Mode.STAND if self.mode is Mode.WALK else self.mode)
         return ACCEPTED
+
+    def _lead(self, number: int, parameters: list[float]) -> int:
+        """An order about tasks; the robot walks as soon as it has one."""
+        if self.wishes.stop or self.wishes.emergency:
+            return DENIED
+        before, board = self.tasks.guide, self.tasks
+        result = board.execute(number, parameters) if number in tasks.ORDERS else board.resume()
+        if board.guide is not None and before is None:
+            self.mode = Mode.WALK
+            self._sticks.extend([_CENTRE] * _MEDIAN_OF)
+        self._settle()
+        return result
+
+    def load(self, points: FloatArray) -> None:
+        """Another list of waypoints, (n, 2) m; a robot on its way to the old ones stands."""
+        before = self.tasks.guide
+        self.tasks.load(points)
+        if before is not None and self.tasks.guide is None:
+            self.mode = Mode.STAND
+        self._settle()
+
+    def progress(self, telemetry: Telemetry) -> list[int]:
+        """Numbers of the waypoints that the robot has reached since; at the last one it stands."""
+        before = self.tasks.guide
+        reached = self.tasks.progress(telemetry)
+        if before is not None and self.tasks.guide is None:
+            self.halt(Mode.STAND)
+        return reached
 
     def _terminate(self, parameters: list[float]) -> int:
         terminate, *unused = parameters
@@ -178,17 +226,24 @@ class CommandInbox:
 
     def halt(self, mode: Mode) -> None:
         """Another mode, and no motion until sticks move again."""
+        self.tasks.pause()
         self.mode = mode
         self._sticks.extend([_CENTRE] * _MEDIAN_OF)
         self._settle()
 
-    def _settle(self) -> None:
-        """Put what holds now into one value, which other threads read."""
-        scale = self.config.scale
+    def _held(self) -> Sticks:
+        """Where the sticks are: the median of the last three of each."""
         forward, left, turn, roll, pitch, yaw, height = (
             sorted(values)[_MEDIAN_OF // 2] for values in zip(*self._sticks, strict=True)
         )
-        moving = self.mode is Mode.WALK
+        return forward, left, turn, roll, pitch, yaw, height
+
+    def _settle(self) -> None:
+        """Put what holds now into one value, which other threads read."""
+        scale = self.config.scale
+        forward, left, turn, roll, pitch, yaw, height = self._held()
+        guide = self.tasks.guide if self.mode is Mode.WALK else None
+        moving = self.mode is Mode.WALK and guide is None
         motion = MotionCommand(
             mode=self.mode,
             velocity=np.array([forward * scale.forward, left * scale.left]) if moving else np.zeros(2),
@@ -198,53 +253,6 @@ class CommandInbox:
                 position=np.array([0.0, 0.0, height * scale.height]),
                 rpy=np.array([roll, pitch, yaw]) * scale.tilt,
             ),
+            guide=guide,
         )
         self._standing = (motion, self._last_sticks, self._last_heartbeat)
-
-
-def read_sticks(message: Any) -> Sticks | None:
-    """The axes of a MANUAL_CONTROL; None where one lies outside of what an axis can have.
-
-    x is forward; y is to the right and r counter-clockwise positive (MAVLink);
-    z (thrust) means nothing to a robot on legs. s is pitch, nose up positive,
-    t is roll, right side down positive; aux1 is the trunk's height, aux2 its
-    heading, left positive.
-    """
-    used = Axis(message.enabled_extensions & sum(Axis))
-    roll = message.t if Axis.ROLL in used else 0
-    pitch = -message.s if Axis.PITCH in used else 0
-    height = message.aux1 if Axis.HEIGHT in used else 0
-    yaw = message.aux2 if Axis.YAW in used else 0
-    values = (message.x, -message.y, message.r, roll, pitch, yaw, height)
-    if any(abs(value) > FULL for value in values):
-        return None
-    forward, left, turn, roll, pitch, yaw, height = (value / FULL + 0.0 for value in values)
-    return forward, left, turn, roll, pitch, yaw, height
-
-
-def write_sticks(command: MotionCommand, scale: StickScale, robot_system: int) -> Any:
-    """MANUAL_CONTROL of a motion command; what is beyond full travel is cut off."""
-    forward, left = command.velocity.tolist()
-    roll, pitch, yaw = command.trunk.rpy.tolist()
-    height = float(command.trunk.position[2])
-    axes = Axis(0)
-    for axis, value in ((Axis.PITCH, pitch), (Axis.ROLL, roll), (Axis.HEIGHT, height), (Axis.YAW, yaw)):
-        axes |= axis if value else Axis(0)
-    return mavlink.MAVLink_manual_control_message(
-        robot_system,
-        _travel(forward, scale.forward),
-        -_travel(left, scale.left),
-        0,
-        _travel(command.yaw_rate, scale.turn),
-        0,
-        0,
-        int(axes),
-        -_travel(pitch, scale.tilt),
-        _travel(roll, scale.tilt),
-        _travel(height, scale.height),
-        _travel(yaw, scale.tilt),
-    )
-
-
-def _travel(value: float, full: float) -> int:
-    return max(-FULL, min(FULL, round(FULL * value / full))) if math.isfinite(value) else 0

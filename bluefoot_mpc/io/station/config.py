@@ -44,16 +44,23 @@ class StationConfig:
     recall_after: float = 1.0  # s of silence after which a walking command has to be given anew
     sequence_window: int = 32  # messages that may be lost in a row before a number counts as an old one
     sequence_timeout: float = 1.0  # s of silence after which any number is taken
+    hand: float = 0.05  # share of a stick's travel from which it counts as moved by hand
+    waypoints_max: int = 50  # that the robot takes
+    mission_patience: float = 0.5  # s until a word of the mission protocol is said again
+    mission_tries: int = 6  # before an upload is given up
     scale: StickScale = StickScale()
 
     def __post_init__(self) -> None:
         require_range(1, 255, robot_system=self.robot_system, robot_component=self.robot_component)
         require_range(1, 255, station_system=self.station_system, station_component=self.station_component)
         require_range(1, 127, sequence_window=self.sequence_window)
+        require_range(1, 1000, waypoints_max=self.waypoints_max)
+        require_range(1, 100, mission_tries=self.mission_tries)
         require_positive(
             line_rate=self.line_rate, down_share=self.down_share, up_share=self.up_share, burst=self.burst,
             heartbeat_timeout=self.heartbeat_timeout, steer_timeout=self.steer_timeout,
             recall_after=self.recall_after, sequence_timeout=self.sequence_timeout,
+            hand=self.hand, mission_patience=self.mission_patience,
         )  # fmt: skip
         if self.down_share + self.up_share > 0.6 + 1e-9:
             raise ConfigurationError(

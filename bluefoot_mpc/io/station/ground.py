@@ -14,7 +14,8 @@ import orjson
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.io.clock import Clock, MonotonicClock
 from bluefoot_mpc.io.station.config import StationConfig
-from bluefoot_mpc.io.station.ground_end import GroundEnd, Order
+from bluefoot_mpc.io.station.ground_end import GroundEnd
+from bluefoot_mpc.io.station.orders import Order
 from bluefoot_mpc.io.station.picture import RobotPicture
 from bluefoot_mpc.io.station.pump import Pump
 from bluefoot_mpc.io.station.signing import Signer, load_key

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import common as mavlink
 
-from bluefoot_mpc.io.station.protocol import unpack_mode
+from bluefoot_mpc.io.station.protocol import LEADS, unpack_mode, unpack_task
 from bluefoot_mpc.io.station.telemetry import (
     CONTACT_BIT,
     CONTACT_VALID_BIT,
+    NAVIGATION,
+    NAVIGATION_TEXT,
     TEMPERATURES,
 )
 from bluefoot_mpc.types import N_JOINTS, N_LEGS, BoolArray, FloatArray
@@ -23,6 +25,45 @@ _UNKNOWN_U16 = 0xFFFF
 
 def _unknown(size: int) -> FloatArray:
     return np.full(size, np.nan)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Way:
+    """How the robot finds its way, as it last said.
+
+    Attributes:
+        lead: what leads it, one of `types.Guided`.
+        waypoints_left: still to be reached.
+        clearance: m to the nearest thing that it knows of; infinite in the open.
+        marker_age: s since it saw the marker; infinite before.
+        marker: (2,) m, where that was, in the odometry frame; NaN before.
+    """
+
+    lead: str
+    waypoints_left: int
+    clearance: float
+    marker_age: float
+    marker: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Mission:
+    """The robot's list of waypoints, as it last said.
+
+    Attributes:
+        next: number of the waypoint that is next, from 0.
+        total: number of waypoints.
+        state: MISSION_STATE.
+    """
+
+    next: int = 0
+    total: int = 0
+    state: int = int(mavlink.MISSION_STATE_NO_MISSION)
+
+    @property
+    def reached(self) -> int:
+        """Number of waypoints that have been reached."""
+        return self.total if self.state == mavlink.MISSION_STATE_COMPLETE else self.next
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -62,6 +103,10 @@ class RobotPicture:
         mode: what the robot does.
         gait: with which gait.
         state: of its safety supervisor.
+        task: what it finds its own way for; empty while it is told where to go.
+        way: how it finds it; None before it has said so.
+        why: the reason for that, where it gave one.
+        mission: its list of waypoints.
         armed: True while torque may be on.
         alarm: MAV_STATE of the heartbeat.
         healthy: parts by name, False where something is wrong with them.
@@ -86,6 +131,10 @@ class RobotPicture:
     mode: str = ""
     gait: str = ""
     state: str = ""
+    task: str = ""
+    way: Way | None = None
+    why: str = ""
+    mission: Mission = field(default_factory=Mission)
     armed: bool = False
     alarm: int = 0
     healthy: dict[str, bool] = field(default_factory=dict)
@@ -109,11 +158,14 @@ class RobotPicture:
 
     def tell(self, text: str, severity: int, now: float) -> None:
         """Add a line for the operator."""
+        if text.startswith(NAVIGATION_TEXT):
+            self.why = text.removeprefix(NAVIGATION_TEXT).partition(": ")[2]
         number = self.texts[-1].number + 1 if self.texts else 1
         self.texts.append(Text(number=number, time=now, severity=severity, text=text))
 
     def _heartbeat(self, message: Any, now: float) -> None:
         self.mode, self.gait, self.state = unpack_mode(message.custom_mode)
+        self.task = unpack_task(message.custom_mode)
         self.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
         self.alarm = message.system_status
 
@@ -147,6 +199,19 @@ class RobotPicture:
         name = message.name if isinstance(message.name, bytes) else str(message.name).encode()
         if name.rstrip(b"\x00") == TEMPERATURES:
             self.temperatures = np.array(message.data[:N_JOINTS])
+        elif name.rstrip(b"\x00") == NAVIGATION:
+            lead, left, clearance, age, x, y = message.data[:6]
+            known = lead in range(len(LEADS)) and left in range(0xFFFF)
+            self.way = Way(
+                lead=str(LEADS[int(lead)]) if known else "?",
+                waypoints_left=int(left) if known else 0,
+                clearance=clearance,
+                marker_age=age,
+                marker=np.array([x, y]),
+            )
+
+    def _mission(self, message: Any, now: float) -> None:
+        self.mission = Mission(next=message.seq, total=message.total, state=message.mission_state)
 
     def _text(self, message: Any, now: float) -> None:
         if message.id == 0:
@@ -177,6 +242,7 @@ _TAKE = {
     "SYS_STATUS": RobotPicture._system,
     "BATTERY_STATUS": RobotPicture._battery,
     "DEBUG_FLOAT_ARRAY": RobotPicture._floats,
+    "MISSION_CURRENT": RobotPicture._mission,
     "STATUSTEXT": RobotPicture._text,
 }
 

@@ -6,7 +6,13 @@ import enum
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from bluefoot_mpc.types import Mode
+from bluefoot_mpc.types import Guided, GuideTask, Mode
+
+ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
+DENIED = int(mavlink.MAV_RESULT_DENIED)
+UNSUPPORTED = int(mavlink.MAV_RESULT_UNSUPPORTED)
+IN_PROGRESS = int(mavlink.MAV_RESULT_IN_PROGRESS)
+FAILED = int(mavlink.MAV_RESULT_FAILED)
 
 MODES: tuple[Mode, ...] = (Mode.OFF, Mode.STAND, Mode.WALK, Mode.SIT, Mode.SAFE)
 """Lowest byte of HEARTBEAT.custom_mode, and param2 of MAV_CMD_DO_SET_MODE."""
@@ -16,6 +22,10 @@ STATES: tuple[str, ...] = (
     "", "disarmed", "checking", "arming", "active", "hold", "sitting", "stopping", "stopped", "emergency",
 )  # fmt: skip
 """Second byte of HEARTBEAT.custom_mode: state of the safety supervisor; 255 is one that is not in here."""
+TASKS: tuple[str, ...] = ("", GuideTask.WANDER, GuideTask.APPROACH, GuideTask.FOLLOW, GuideTask.GOTO)
+"""Fourth byte of HEARTBEAT.custom_mode, and param1 of MAV_CMD_USER_1: what the robot finds its way for."""
+LEADS: tuple[Guided, ...] = tuple(Guided)
+"""First number of the array ``nav``: what leads the robot."""
 _UNKNOWN = 255
 
 FORCE = 21196.0
@@ -32,11 +42,11 @@ class Axis(enum.IntFlag):
     YAW = 8  # aux2
 
 
-def pack_mode(mode: Mode, gait: str, state: str) -> int:
+def pack_mode(mode: Mode, gait: str, state: str, task: str = "") -> int:
     """HEARTBEAT.custom_mode of what the robot does."""
     gait_number = GAITS.index(gait) if gait in GAITS else _UNKNOWN
     state_number = STATES.index(state) if state in STATES else _UNKNOWN
-    return MODES.index(mode) | state_number << 8 | gait_number << 16
+    return MODES.index(mode) | state_number << 8 | gait_number << 16 | TASKS.index(task) << 24
 
 
 def unpack_mode(custom_mode: int) -> tuple[str, str, str]:
@@ -47,6 +57,20 @@ def unpack_mode(custom_mode: int) -> tuple[str, str, str]:
         table[number] if number < len(table) else "?" for number, table in zip(numbers, tables, strict=True)
     )
     return mode, gait, state
+
+
+def unpack_task(custom_mode: int) -> str:
+    """The task in a HEARTBEAT.custom_mode; empty without one, ``"?"`` for one that is not known."""
+    number = custom_mode >> 24 & 0xFF
+    return str(TASKS[number]) if number < len(TASKS) else "?"
+
+
+def mission_result_name(result: int) -> str:
+    """What a MISSION_ACK says, as words."""
+    entry = mavlink.enums["MAV_MISSION_RESULT"].get(result)
+    if entry is None:
+        return f"result {result}"
+    return str(entry.name).removeprefix("MAV_MISSION_").lower().replace("_", " ")
 
 
 def result_name(result: int) -> str:

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections import deque
 from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
 from bluefoot_mpc.io.station import telemetry as tell
-from bluefoot_mpc.io.station.commands import ACCEPTED, FAILED, IN_PROGRESS, CommandInbox
+from bluefoot_mpc.io.station.commands import CommandInbox
 from bluefoot_mpc.io.station.config import BITS_PER_BYTE, StationConfig
 from bluefoot_mpc.io.station.framing import FrameReader, Received
+from bluefoot_mpc.io.station.mission import MissionServer
+from bluefoot_mpc.io.station.protocol import ACCEPTED, FAILED, IN_PROGRESS
 from bluefoot_mpc.io.station.schedule import Schedule, Stream, TokenBucket
 from bluefoot_mpc.io.station.sequence import SequenceGuard
 from bluefoot_mpc.io.station.signing import Signer
 from bluefoot_mpc.io.station.telemetry import Snapshot, UplinkHealth
 from bluefoot_mpc.io.station.writer import FrameWriter
+from bluefoot_mpc.types import FloatArray
 
 STREAMS = (
     Stream(name="heartbeat", rate=1.0, urgent=True),
@@ -26,6 +31,8 @@ STREAMS = (
     Stream(name="system", rate=2.0),
     Stream(name="battery", rate=2.0),
     Stream(name="temperatures", rate=1.0),
+    Stream(name="mission", rate=1.0),
+    Stream(name="navigation", rate=1.0),
 )
 """What goes down to the station."""
 _BUILD = {
@@ -34,9 +41,12 @@ _BUILD = {
     "position": tell.position,
     "battery": tell.battery,
     "temperatures": tell.temperatures,
+    "navigation": tell.navigation,
 }
 _ALIVE = 0.3  # s, age of a command that still counts as a working uplink
 _REPEAT = 5.0  # s in which the same text is told once
+_LED_PERIOD = 0.5  # s between two words on what leads the robot
+_NUMBER = re.compile(r"\d+(\.\d+)?")
 _ARM = int(mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
 
 
@@ -52,6 +62,7 @@ class RobotEnd:
 
     Attributes:
         inbox: what the station wants.
+        mission: takes and gives lists of waypoints.
         reader: finds frames.
         refused: frames with a right sum and no valid signature.
     """
@@ -73,6 +84,16 @@ class RobotEnd:
         self._text_number = 0
         self._guards: dict[int, SequenceGuard] = {}
         self._shown = 0
+        self._seen: Snapshot | None = None
+        self._led, self._led_told = "", -math.inf
+        self._has_list = False
+        self._current = self.inbox.tasks.current()
+        self.mission = MissionServer(
+            config,
+            lambda: self.inbox.tasks.points,
+            self._take_list,
+            lambda text: self.say(mavlink.MAV_SEVERITY_WARNING, text),
+        )
 
     @property
     def guards(self) -> tuple[SequenceGuard, ...]:
@@ -110,8 +131,9 @@ class RobotEnd:
 
     def produce(self, now: float) -> bytes | None:
         """The next frame to send now; None while nothing is due or the line has no room."""
+        self._follow(now)
         while self.writer.may_send(now):
-            message = self.writer.take_answer() or self._due(now)
+            message = self.writer.take_answer() or self.mission.due(now) or self._due(now)
             if message is None:
                 return None
             if message is not _NOTHING:
@@ -120,7 +142,7 @@ class RobotEnd:
 
     def wait(self, now: float) -> float:
         """Time (s) until `produce` may have something."""
-        pause = 0.0 if self.writer.waiting else self._schedule.wait(now)
+        pause = 0.0 if self.writer.waiting else min(self._schedule.wait(now), self.mission.wait(now))
         return max(pause, self.writer.wait(now))
 
     def _trusted(self, received: Received, now: float) -> bool:
@@ -147,6 +169,30 @@ class RobotEnd:
             result = self.inbox.execute(message)
             answer = IN_PROGRESS if result is None else result
             self.writer.answer(mavlink.MAVLink_command_ack_message(message.command, answer))
+        elif kind.startswith("MISSION_") and self._is_meant(message):
+            for reply in self.mission.take(message, now):
+                self.writer.answer(reply)
+
+    def _take_list(self, points: FloatArray) -> None:
+        self.inbox.load(points)
+        self._has_list = True
+
+    def _follow(self, now: float) -> None:
+        """Notice what the robot has reached, and what leads it now."""
+        snapshot = self._snapshot
+        if snapshot is None or snapshot is self._seen:
+            return
+        self._seen = snapshot
+        for number in self.inbox.progress(snapshot.telemetry):
+            self.writer.answer(mavlink.MAVLink_mission_item_reached_message(number))
+        led = tell.led(snapshot)
+        # Another number in the same words is nothing new.
+        words = _NUMBER.sub("#", led)
+        if words != self._led and now - self._led_told >= _LED_PERIOD:
+            self._led, self._led_told = words, now
+            self._schedule.hurry("navigation", now)
+            if led:
+                self.say(mavlink.MAV_SEVERITY_INFO, f"{tell.NAVIGATION_TEXT}{led}")
 
     def _is_meant(self, message: Any) -> bool:
         component = message.target_component in (0, self._config.robot_component)
@@ -154,24 +200,36 @@ class RobotEnd:
 
     def _due(self, now: float) -> Any:
         """The message whose turn it is; `_NOTHING` where a stream has none; None: no stream is due."""
-        self._hurry_heartbeat(now)
+        self._hurry_changes(now)
         name = self._schedule.next(now)
         if name is None:
             return None
         self._schedule.done(name, now)
-        snapshot = self._snapshot
         if name == "heartbeat":
-            return tell.heartbeat(snapshot)
+            return tell.heartbeat(self._snapshot)
         if name == "text":
             return self._text(now)
+        if name == "mission":
+            current = mavlink.MAVLink_mission_current_message(*self._current)
+            return current if self._has_list else _NOTHING
+        return self._state(name, now)
+
+    def _state(self, name: str, now: float) -> Any:
+        snapshot = self._snapshot
         # What has not changed since is not sent again: a station must see that a robot stands still.
         if snapshot is None or self._sent.get(name) is snapshot:
             return _NOTHING
         self._sent[name] = snapshot
-        return tell.system(snapshot, self._health(now)) if name == "system" else _BUILD[name](snapshot)
+        if name == "system":
+            return tell.system(snapshot, self._health(now))
+        return _BUILD[name](snapshot) or _NOTHING
 
-    def _hurry_heartbeat(self, now: float) -> None:
-        """A change of mode or state is told at once."""
+    def _hurry_changes(self, now: float) -> None:
+        """A change of mode, state or waypoint is told at once."""
+        current = self.inbox.tasks.current()
+        if current != self._current:
+            self._current = current
+            self._schedule.hurry("mission", now)
         if self._snapshot is not None:
             mode = tell.heartbeat(self._snapshot).custom_mode
             if mode != self._shown:

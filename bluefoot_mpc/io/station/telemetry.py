@@ -14,14 +14,17 @@ from typing import Any
 from pymavlink.dialects.v20 import common as mavlink
 
 from bluefoot_mpc.geometry import rotation_from_quaternion
-from bluefoot_mpc.io.station.protocol import pack_mode
+from bluefoot_mpc.io.station.protocol import LEADS, pack_mode
 from bluefoot_mpc.types import Mode, SensorFrame, Telemetry
 
 N_OUTPUTS = 32  # of ACTUATOR_OUTPUT_STATUS
 CONTACT_BIT = 16
 CONTACT_VALID_BIT = 20
 TEMPERATURES = b"temp"
-_TEMPERATURE_ARRAY = 1
+NAVIGATION = b"nav"
+NAVIGATION_TEXT = "navigation: "
+"""How texts begin that say what leads the robot on its own way, and why."""
+_TEMPERATURE_ARRAY, _NAVIGATION_ARRAY = 1, 2
 _UNKNOWN_U16 = 0xFFFF
 _UNKNOWN_I16 = 0x7FFF
 _LOW, _CRITICAL, _EMERGENCY = 10.8, 10.2, 9.6  # V, of a 3S pack: warn, sit, cut
@@ -71,19 +74,23 @@ class UplinkHealth:
 
 
 def heartbeat(snapshot: Snapshot | None) -> Any:
-    """HEARTBEAT: mode, gait and supervisor's state in custom_mode, armed or not in base_mode."""
+    """HEARTBEAT: mode, gait, supervisor's state and task in custom_mode, armed and guided in base_mode."""
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
-    mode, gait, state, status = Mode.OFF, "", "", mavlink.MAV_STATE_BOOT
+    mode, gait, state, task, status = Mode.OFF, "", "", "", mavlink.MAV_STATE_BOOT
     if snapshot is not None:
         mode, gait = snapshot.telemetry.mode, snapshot.telemetry.motion.gait
         state, status = snapshot.state, _status(snapshot)
+        guide = snapshot.telemetry.motion.guide
+        if guide is not None:
+            task = str(guide.task)
+            base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
         if mode is not Mode.OFF and state not in _POWERLESS:
             base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
     return mavlink.MAVLink_heartbeat_message(
         mavlink.MAV_TYPE_GROUND_QUADRUPED,
         mavlink.MAV_AUTOPILOT_GENERIC,
         base,
-        pack_mode(mode, gait, state),
+        pack_mode(mode, gait, state, task),
         status,
         3,
     )
@@ -184,6 +191,35 @@ def temperatures(snapshot: Snapshot) -> Any:
     return mavlink.MAVLink_debug_float_array_message(
         int(snapshot.frame.time * 1e6), TEMPERATURES, _TEMPERATURE_ARRAY, values + [0.0] * (58 - len(values))
     )
+
+
+def navigation(snapshot: Snapshot) -> Any:
+    """DEBUG_FLOAT_ARRAY named ``nav``, or None while the robot is told where to go.
+
+    Its numbers: what leads (`protocol.LEADS`), waypoints left, clearance (m), age of the marker's
+    sighting (s), where it was seen (m, odometry frame, x and y); infinite and NaN as in the report.
+    """
+    report = snapshot.telemetry.navigation
+    if report is None:
+        return None
+    values = [
+        float(LEADS.index(report.guided)),
+        float(report.waypoints_left),
+        report.clearance,
+        report.marker_age,
+        *report.marker_position[:2].tolist(),
+    ]
+    return mavlink.MAVLink_debug_float_array_message(
+        int(snapshot.frame.time * 1e6), NAVIGATION, _NAVIGATION_ARRAY, values + [0.0] * (58 - len(values))
+    )
+
+
+def led(snapshot: Snapshot) -> str:
+    """What leads the robot and why, in words; empty while it is told where to go."""
+    report = snapshot.telemetry.navigation
+    if report is None:
+        return ""
+    return f"{report.guided}: {report.reason}" if report.reason else str(report.guided)
 
 
 def texts(severity: int, text: str, number: int) -> list[Any]:

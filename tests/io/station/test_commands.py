@@ -6,16 +6,10 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from bluefoot_mpc.io.station.commands import (
-    ACCEPTED,
-    DENIED,
-    UNSUPPORTED,
-    CommandInbox,
-    Wishes,
-    read_sticks,
-    write_sticks,
-)
+from bluefoot_mpc.io.station.commands import CommandInbox, Wishes
 from bluefoot_mpc.io.station.config import StationConfig, StickScale
+from bluefoot_mpc.io.station.protocol import ACCEPTED, DENIED, UNSUPPORTED
+from bluefoot_mpc.io.station.sticks import read_sticks, write_sticks
 from bluefoot_mpc.types import Mode, MotionCommand, TrunkPose
 
 from .made_up import OFF, SAFE, SIT, STAND, WALK

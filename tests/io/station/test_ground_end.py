@@ -5,7 +5,8 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from bluefoot_mpc.io.station.config import StationConfig
-from bluefoot_mpc.io.station.ground_end import GroundEnd, Order
+from bluefoot_mpc.io.station.ground_end import GroundEnd
+from bluefoot_mpc.io.station.orders import Order
 from bluefoot_mpc.types import Mode, MotionCommand
 
 from .made_up import OFF, SIT, STAND, WALK, Peer, sent

@@ -17,8 +17,8 @@ from bluefoot_mpc.io.clock import MonotonicClock
 from bluefoot_mpc.io.link import LinkError
 from bluefoot_mpc.io.safety import CommandWatchdog
 from bluefoot_mpc.io.station.ground import GroundLink, OperatorLog
-from bluefoot_mpc.io.station.ground_end import Order
 from bluefoot_mpc.io.station.link import StationLink
+from bluefoot_mpc.io.station.orders import Order
 from bluefoot_mpc.io.station.source import LinkSource
 from bluefoot_mpc.io.station.transport import Address
 from bluefoot_mpc.types import Mode, MotionCommand

@@ -8,7 +8,8 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from bluefoot_mpc.io.station.commands import Wishes
 from bluefoot_mpc.io.station.config import StationConfig
-from bluefoot_mpc.io.station.ground_end import GroundEnd, Order
+from bluefoot_mpc.io.station.ground_end import GroundEnd
+from bluefoot_mpc.io.station.orders import Order
 from bluefoot_mpc.io.station.robot_end import RobotEnd
 from bluefoot_mpc.io.station.signing import Signer
 from bluefoot_mpc.types import Mode, MotionCommand, TrunkPose
