@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bluefoot_mpc.evaluation import law_cases, level_cases, model_cases
+from bluefoot_mpc.evaluation import law_cases, level_cases, model_cases, way_cases
 from bluefoot_mpc.evaluation.cases import Case
 from bluefoot_mpc.exceptions import UnknownNameError
 
@@ -21,6 +21,9 @@ BATTERIES: dict[str, Callable[[], tuple[Case, ...]]] = {
     "mpc pushes": model_cases.push_battery,
     "mpc manoeuvres": model_cases.manoeuvre_cases,
     "levelling": level_cases.level_battery,
+    "wander": way_cases.wander_cases,
+    "approach": way_cases.approach_cases,
+    "follow": way_cases.follow_cases,
 }
 """Each function gives the cases of its battery."""
 
