@@ -23,6 +23,7 @@ from bluefoot_mpc.cli.emulator_arguments import EmulatorCommand
 from bluefoot_mpc.cli.servo_arguments import ServoCommand
 from bluefoot_mpc.cli.station_arguments import StationCommand
 from bluefoot_mpc.cli.validate_arguments import ValidateCommand
+from bluefoot_mpc.cli.world_arguments import WorldCommand
 
 ModelCommand = (
     Annotated[CheckCommand, tyro.conf.subcommand("check")]
@@ -37,6 +38,7 @@ Command = (
     | Annotated[
         ModelCommand, tyro.conf.subcommand("model", description="Check and export the robot's model.")
     ]
+    | Annotated[WorldCommand, tyro.conf.subcommand("world")]
     | Annotated[DriveCommand, tyro.conf.subcommand("drive")]
     | Annotated[BenchCommand, tyro.conf.subcommand("bench")]
     | Annotated[EmulatorCommand, tyro.conf.subcommand("emulator")]

@@ -21,6 +21,7 @@ from bluefoot_mpc.cli import (
     servo_arguments,
     station_arguments,
     validate_arguments,
+    world_arguments,
 )
 from bluefoot_mpc.cli.messages import keep_traceback, messages_on_stderr
 from bluefoot_mpc.cli.outcome import FAILED, INTERRUPTED, OK, Outcome, to_json
@@ -47,6 +48,7 @@ _EXECUTE: dict[type, str] = {
     station_arguments.StationCommand: "station:station",
     validate_arguments.ValidateCommand: "validate:validate",
     deploy_arguments.DeployCommand: "deploy:deploy",
+    world_arguments.WorldCommand: "world:world",
 }
 """Command to the function that runs it; imported late, so that ``--help`` is quick."""
 

@@ -20,6 +20,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "run": (),
     "replay": (),
     "model": ("check", "urdf", "rom", "power"),
+    "world": (),
     "drive": (),
     "bench": (),
     "emulator": (),

@@ -207,7 +207,9 @@ def _obstacles(plan: WorldPlan) -> tuple[Solid, ...]:
     if marker is None:
         return solids
     size = (2.0 * marker.radius, 2.0 * marker.radius, marker.z + marker.radius)
-    return *solids, Solid(name="marker", shape="cylinder", x=marker.x, y=marker.y, z=0.5 * size[2], size=size)
+    return *solids, Solid(
+        name="marker_disc", shape="cylinder", x=marker.x, y=marker.y, z=0.5 * size[2], size=size
+    )
 
 
 def _inside(points: FloatArray, bounds: tuple[float, float, float, float], margin: float) -> BoolArray:

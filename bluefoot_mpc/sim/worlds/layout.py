@@ -37,6 +37,11 @@ THINGS: tuple[Colour, ...] = (
 """Colours of things: none of them near the marker's."""
 
 
+_SIDES = ("wall_front", "wall_left", "wall_back", "wall_right")
+"""Outer walls, leftward round, as seen from the start."""
+_TURNED_LEFT = dict(zip(_SIDES, (*_SIDES[1:], _SIDES[0]), strict=True))
+
+
 class Layout:
     """Solids of a world under construction.
 
@@ -76,8 +81,8 @@ class Layout:
             ((x0 - half, y0 - half), (x0 - half, y1 + half)),
             ((x0 - half, y0 - half), (x1 + half, y0 - half)),
         )
-        for name, (start, end), colour in zip(("front", "left", "back", "right"), ends, colours, strict=True):
-            self.add(wall(f"wall_{name}", start, end, colour))
+        for name, (start, end), colour in zip(_SIDES, ends, colours, strict=True):
+            self.add(wall(name, start, end, colour))
 
     def has_room(self, things: Sequence[Solid], *, by_walls: bool = False) -> bool:
         """True where new things leave passages to all others, and start and marker free.
@@ -155,6 +160,7 @@ def pick(rng: np.random.Generator, colours: Sequence[Colour] = THINGS) -> Colour
 
 def _turned_left(solid: Solid) -> Solid:
     """A solid, turned left about the origin by a quarter."""
+    solid = replace(solid, name=_TURNED_LEFT.get(solid.name, solid.name))
     length, width, height = solid.size
     if solid.yaw == 0.0:
         return replace(solid, x=-solid.y, y=solid.x, size=(width, length, height))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 
 from bluefoot_mpc.sim.config import PLANNED_WORLDS, WorldConfig
 from bluefoot_mpc.sim.randomization import stream
 from bluefoot_mpc.sim.worlds.corridors import corridors
+from bluefoot_mpc.sim.worlds.files import read_plan
 from bluefoot_mpc.sim.worlds.furniture import chairs
 from bluefoot_mpc.sim.worlds.hiding import hidden
 from bluefoot_mpc.sim.worlds.layout import Layout
@@ -40,7 +42,7 @@ def world_plan(config: WorldConfig, seed: int) -> WorldPlan | None:
     """
     if config.name in PLANNED_WORLDS:
         return make_plan(config.name, seed if config.layout_seed < 0 else config.layout_seed)
-    return None
+    return read_plan(Path(config.name)) if config.is_planned else None
 
 
 def make_plan(kind: str, seed: int) -> WorldPlan:

@@ -6,9 +6,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.settings import require_finite, require_positive
+from bluefoot_mpc.settings import require_finite, require_positive, require_range
 
 Shape = Literal["box", "cylinder"]
+
+TAKEN_NAMES = ("floor", "marker", "marker_post")
+"""Names that the simulator gives to what is no solid of a plan."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -20,16 +23,30 @@ class Solid:
     x: float  # m, centre in world
     y: float  # m
     z: float  # m
-    size: tuple[
-        float, float, float
-    ]  # m: full length, width and height; of a cylinder diameter twice and height
+    size: tuple[float, float, float]  # m: length, width, height; of a cylinder diameter twice and height
     yaw: float = 0.0  # rad, left
     colour: tuple[float, float, float] = (0.72, 0.70, 0.66)  # red, green, blue, 0..1
 
     def __post_init__(self) -> None:
+        if not self.name or self.name in TAKEN_NAMES:
+            raise ConfigurationError(f"a solid must have a name, and not one of: {', '.join(TAKEN_NAMES)}")
+        try:
+            self._require_possible()
+        except ConfigurationError as error:
+            raise ConfigurationError(f"solid '{self.name}': {error}") from error
+
+    def _require_possible(self) -> None:
         require_finite(x=self.x, y=self.y, z=self.z, yaw=self.yaw)
         length, width, height = self.size
         require_positive(length=length, width=width, height=height)
+        if self.shape == "cylinder" and length != width:
+            raise ConfigurationError(
+                f"size = {list(self.size)}: a cylinder is as wide as long: [diameter, diameter, height]"
+            )
+        if self.z + 0.5 * height <= 0.0:
+            raise ConfigurationError(f"it is below the floor: z = {self.z:g} is its middle")
+        red, green, blue = self.colour
+        require_range(0.0, 1.0, red=red, green=green, blue=blue)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -41,6 +58,15 @@ class Marker:
     z: float = 0.20  # m
     radius: float = 0.06  # m
     colour: tuple[float, float, float] = (0.90, 0.10, 0.55)  # red, green, blue, 0..1
+
+    def __post_init__(self) -> None:
+        require_finite(x=self.x, y=self.y)
+        require_positive(radius=self.radius)
+        if not self.z >= self.radius:
+            raise ConfigurationError(f"marker: z = {self.z:g} must be at least its radius {self.radius:g}")
+        require_finite(z=self.z)
+        red, green, blue = self.colour
+        require_range(0.0, 1.0, red=red, green=green, blue=blue)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -63,8 +89,10 @@ class WorldPlan:
 
     def __post_init__(self) -> None:
         names = [solid.name for solid in self.solids]
-        if len(set(names)) != len(names):
-            raise ConfigurationError(f"world '{self.name}': two solids have the same name")
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ConfigurationError(f"world '{self.name}': two solids have the name '{twice}'")
+        require_finite(bounds=self.bounds)
         least_x, least_y, greatest_x, greatest_y = self.bounds
         if not (least_x < 0.0 < greatest_x and least_y < 0.0 < greatest_y):
             raise ConfigurationError(

@@ -1,0 +1,74 @@
+"""``bluefoot world``: make a world, tell what is in it, write and draw it."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from typing import Any
+
+from bluefoot_mpc.cli.outcome import Outcome
+from bluefoot_mpc.cli.world_arguments import WorldCommand
+from bluefoot_mpc.cli.world_picture import save_world_picture
+from bluefoot_mpc.exceptions import UnknownNameError
+from bluefoot_mpc.settings import to_table
+from bluefoot_mpc.sim.config import PLANNED_WORLDS, WorldConfig
+from bluefoot_mpc.sim.worlds.coverage import ROBOT_RADIUS, Grid, reachable
+from bluefoot_mpc.sim.worlds.files import write_plan
+from bluefoot_mpc.sim.worlds.make import world_plan
+from bluefoot_mpc.sim.worlds.plan import WorldPlan
+
+
+_SCENARIOS = {"hidden": "approach", "arena": "follow"}
+"""Which scenario a kind of world was made for, where it is not ``wander``."""
+
+
+def world(command: WorldCommand) -> Outcome:
+    """Make or read the world; write what is asked for."""
+    plan = world_plan(WorldConfig(name=command.kind), command.seed)
+    if plan is None:
+        raise UnknownNameError("kind of world", command.kind, PLANNED_WORLDS)
+    grid = reachable(plan)
+    lines = _describe(plan, grid)
+    files = []
+    if command.out is not None:
+        write_plan(plan, command.out)
+        files.append(command.out)
+    if command.picture is not None:
+        save_world_picture(plan, grid, command.picture)
+        files.append(command.picture)
+    lines += [f"wrote {file}" for file in files]
+    source = command.out or command.kind
+    seed = "" if str(source).endswith(".toml") else f" --seed {command.seed}"
+    scenario = _SCENARIOS.get(plan.name, "wander")
+    lines.append(f"walk in it: bluefoot run {scenario} --world {source}{seed}")
+    data: dict[str, Any] = {
+        "plan": to_table(plan),
+        "reachable_m2": round(grid.area, 3),
+        "robot_radius_m": ROBOT_RADIUS,
+        "files": [str(file) for file in files],
+    }
+    return Outcome(data=data, page=("\n".join(lines),))
+
+
+def _describe(plan: WorldPlan, grid: Grid) -> list[str]:
+    x0, y0, x1, y1 = plan.bounds
+    things = ", ".join(f"{count} {kind}" for kind, count in _things(plan).items())
+    lines = [
+        f"{plan.name}, seed {plan.seed}: {x1 - x0:.2f} m x {y1 - y0:.2f} m;"
+        f" the robot starts {-x0:.2f} m from the back and {-y0:.2f} m from the right side",
+        f"{len(plan.solids)} solids: {things or 'none'}",
+        f"floor that the robot can get at: {grid.area:.1f} m²",
+    ]
+    if plan.marker is not None:
+        lines.append(f"marker at x = {plan.marker.x:.2f} m, y = {plan.marker.y:.2f} m")
+    return lines
+
+
+def _things(plan: WorldPlan) -> Counter[str]:
+    """How many things of each kind there are; a chair's legs, seat and back are one chair."""
+    whole = {re.sub(r"_(leg\d*|seat|back|top|post)$", "", solid.name) for solid in plan.solids}
+    return Counter(_kind(name) for name in sorted(whole))
+
+
+def _kind(name: str) -> str:
+    return "wall" if name.startswith("wall") else re.sub(r"\d+$", "", name)

@@ -1,0 +1,92 @@
+"""World plans as TOML files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.settings import build, dump_toml, read_toml, to_table
+from bluefoot_mpc.sim.worlds import footprint
+from bluefoot_mpc.sim.worlds.plan import WorldPlan
+
+START_RADIUS = 0.35
+"""m around the origin that must be free in any world: the robot stands there with its legs."""
+
+GREATEST_SIDE = 60.0
+"""m; the floor's cells must fit into memory."""
+
+_HEADER = """\
+# A world on level floor, m and rad. The robot starts at the origin and looks along x.
+# bounds: least x, least y, greatest x, greatest y of the floor that counts.
+# A solid: shape is box or cylinder; x, y, z its centre (without z it stands on the floor);
+# size is length, width and height, of a cylinder twice the diameter and the height; yaw turns it left.
+
+"""
+
+
+def read_plan(path: Path) -> WorldPlan:
+    """Read a plan, and check that a robot can start in it.
+
+    What may be left out: name (the file's), seed, z, yaw, colour and marker.
+
+    Raises:
+        ConfigurationError: the file cannot be read, or says what cannot be.
+    """
+    table = {"name": path.stem, "seed": 0, **read_toml(path)}
+    table.setdefault("solids", [])
+    if "bounds" not in table:
+        raise ConfigurationError(
+            f"{path}: no bounds. Add a line with least x, least y, greatest x, greatest y of the floor in m:"
+            " bounds = [-1.0, -2.0, 5.0, 2.0]"
+        )
+    if isinstance(table["solids"], list):
+        table["solids"] = [_standing(solid) for solid in table["solids"]]
+    try:
+        plan = build(WorldPlan, table)
+        _require_start(plan)
+    except ConfigurationError as error:
+        raise ConfigurationError(f"{path}: {error}") from error
+    return plan
+
+
+def write_plan(plan: WorldPlan, path: Path) -> None:
+    """Write a plan so that `read_plan` gives the same one again.
+
+    Raises:
+        ConfigurationError: the file cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(_HEADER + dump_toml(to_table(plan)), encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def _standing(solid: Any) -> Any:
+    """A solid's table; without a height above the floor it stands on it."""
+    if not isinstance(solid, Mapping) or "z" in solid:
+        return solid
+    size = solid.get("size")
+    if isinstance(size, list) and len(size) == 3 and isinstance(size[2], (int, float)):
+        return {**solid, "z": 0.5 * size[2]}
+    return solid
+
+
+def _require_start(plan: WorldPlan) -> None:
+    """Refuse a world without room for the robot where it starts."""
+    x0, y0, x1, y1 = plan.bounds
+    if max(x1 - x0, y1 - y0) > GREATEST_SIDE:
+        raise ConfigurationError(
+            f"bounds = {list(plan.bounds)}: at most {GREATEST_SIDE:g} m from side to side"
+        )
+    way_out = f"the robot starts at the origin and needs {START_RADIUS:g} m around it; move the solid"
+    for solid in footprint.in_the_way(plan.solids):
+        if footprint.distance(np.zeros((1, 2)), solid)[0] < START_RADIUS:
+            raise ConfigurationError(f"'{solid.name}' stands in the start: {way_out}")
+    marker = plan.marker
+    if marker is not None and np.hypot(marker.x, marker.y) - marker.radius < START_RADIUS:
+        raise ConfigurationError(f"the marker stands in the start: {way_out.replace('solid', 'marker')}")
