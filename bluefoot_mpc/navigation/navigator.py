@@ -1,4 +1,4 @@
-"""How the robot finds its way: the laws in their order, once per tick."""
+"""How the robot finds its way: surroundings, the law that leads, the way out of corners, the guard."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from bluefoot_mpc.model.parameters import SensorMounts
-from bluefoot_mpc.navigation import potential_field
 from bluefoot_mpc.navigation.config import NavigationConfig
+from bluefoot_mpc.navigation.escape import Escape, StuckWatch
 from bluefoot_mpc.navigation.guard import Guard
+from bluefoot_mpc.navigation.leading import Lead, Leading
 from bluefoot_mpc.navigation.limits import Motion, allowed, ramped
-from bluefoot_mpc.navigation.potential_field import Field, Pace
-from bluefoot_mpc.navigation.scan import LevelScan, ScanReader
+from bluefoot_mpc.navigation.scan import LevelScan
+from bluefoot_mpc.navigation.surroundings import Surroundings
 from bluefoot_mpc.types import BodyState, FloatArray, Guide, Guided, NavigationReport, SensorFrame
 
 
@@ -37,6 +38,9 @@ class Decision:
 class Navigator:
     """Finds the way from LIDAR, camera and the estimated state.
 
+    A tick with a new sweep decides; the ticks between hold the decision, and
+    work on the map and on ways over it.
+
     Args:
         config: of each part.
         mounts: where the sensors are.
@@ -44,18 +48,23 @@ class Navigator:
 
     def __init__(self, config: NavigationConfig, mounts: SensorMounts) -> None:
         self._config = config
-        self._reader = ScanReader(config.scan, mounts)
+        self._around = Surroundings(config, mounts)
+        self._leading = Leading(config, mounts)
+        self._watch = StuckWatch(config.escape)
+        self._escape = Escape(config.escape)
         self._guard = Guard(config.guard)
         self.reset()
 
     def reset(self) -> None:
         """Forget everything: the state after ``__init__``, bit for bit."""
-        self._scan: LevelScan | None = None
-        self._fault = "no sweep of the LIDAR yet"
-        self._field = Field(np.zeros(2), 0.0)
-        self._pace = Pace(0.0, 0.0)
+        self._around.reset()
+        self._leading.reset()
+        self._watch.reset()
+        self._escape.reset()
+        self._lead = Lead(Guided.BLIND, Motion())
         self._wanted = Motion()
         self._motion = Motion()
+        self._gait = Motion()
         self._clearance = math.inf
 
     def step(self, guide: Guide, frame: SensorFrame, estimate: BodyState, dt: float) -> Decision:
@@ -67,45 +76,68 @@ class Navigator:
             estimate: estimated state of the robot.
             dt: s, command period.
         """
-        if frame.lidar is not None:
-            result = self._reader.read(frame.lidar, estimate)
-            if isinstance(result, str):
-                self._fault = result
-            else:
-                self._fault = ""
-                self._scan = result
-                self._decide(guide, result)
-        blind = self._blind(frame.time)
+        around, leading = self._around, self._leading
+        fresh = around.step(frame, estimate)
+        leading.look(guide, frame, estimate, dt)
+        if fresh and around.scan is not None:
+            self._decide(guide, around.scan, frame.time)
+        elif not around.settle():
+            leading.search(guide, around, frame.time)
+        blind = around.blind(frame.time)
         if blind:
-            self._wanted = Motion()
-            self._pace = Pace(0.0, 0.0)
+            self._stand(blind)
         self._motion = ramped(self._motion, self._wanted, dt, self._config.limits)
-        return self._decision(Guided.BLIND if blind else Guided.FIELD, blind)
+        self._gait = self._config.guard.ramp.followed(self._gait, self._motion, dt)
+        return self._decision()
 
-    def _decide(self, guide: Guide, scan: LevelScan) -> None:
-        config = self._config
-        self._field = potential_field.field(scan.bearing, scan.distance, config.field)
-        self._pace = potential_field.advance(self._pace, self._field, config.field)
-        wanted = allowed(Motion(self._pace.speed, 0.0, self._pace.yaw_rate), guide.speed, config.limits)
-        guarded = self._guard.step(scan.points[scan.hit], wanted, self._motion)
+    def _decide(self, guide: Guide, scan: LevelScan, time: float) -> None:
+        """What to do until the next sweep."""
+        lead = self._leading.step(guide, self._around, scan)
+        lead = self._out_of_the_corner(lead, time)
+        wanted = allowed(lead.motion, guide.speed, self._config.limits)
+        guarded = self._guard.step(self._around.points(), wanted, self._gait)
+        self._lead = lead
         self._wanted, self._clearance = guarded.motion, guarded.clearance
 
-    def _blind(self, time: float) -> str:
-        """Why the robot cannot see; empty while it can."""
-        if self._scan is None:
-            return self._fault
-        age = time - self._scan.time
-        if age <= self._config.scan.stale_after:
-            return ""
-        return f"no usable sweep of the LIDAR for {age:.1f} s" + (f": {self._fault}" if self._fault else "")
+    def _out_of_the_corner(self, lead: Lead, time: float) -> Lead:
+        """The way out in place of what leads, where the robot has been stuck."""
+        pose = self._around.pose
+        rests = self._watch.rests(pose, time)
+        if not any(lead.motion):
+            self._watch.reset()
+            self._escape.reset()
+            return lead
+        if not self._escape.active and rests > self._config.escape.patience:
+            self._escape.begin(pose, time, self._around.openness())
+            self._leading.give_up(time)
+        if self._escape.active:
+            motion = self._escape.step(pose, time)
+            if self._escape.active:
+                return Lead(Guided.ESCAPE, motion, "stuck: turning, backing off, stepping aside in turn")
+            self._watch.reset()
+        return lead
 
-    def _decision(self, guided: Guided, reason: str) -> Decision:
+    def _stand(self, reason: str) -> None:
+        """Nothing to go by: stand, and begin afresh when that ends."""
+        self._lead = Lead(Guided.BLIND, Motion(), reason)
+        self._wanted = Motion()
+        self._leading.rest()
+        self._watch.reset()
+        self._escape.reset()
+
+    def _decision(self) -> Decision:
+        leading, wish, scan = self._leading, self._leading.wish, self._around.scan
         velocity = np.array(self._motion[:2])
+        pitch = 0.0 if wish is None else wish.pitch
+        nowhere = np.full(3, np.nan)
         report = NavigationReport(
-            guided=guided, velocity=velocity, yaw_rate=self._motion.yaw_rate, pitch=0.0,
-            field=self._field.force, potential=self._field.potential, mixing=0.0,
-            marker=np.full(3, np.nan), marker_position=np.full(3, np.nan), marker_age=math.inf,
-            clearance=self._clearance, scan_time=math.nan if self._scan is None else self._scan.time,
-            reason=reason,
+            guided=self._lead.guided, velocity=velocity, yaw_rate=self._motion.yaw_rate, pitch=pitch,
+            field=leading.field.force, potential=leading.field.potential,
+            mixing=0.0 if wish is None else wish.mixing,
+            marker=nowhere if wish is None else wish.marker,
+            marker_position=nowhere if wish is None else wish.position,
+            marker_age=math.inf if wish is None else wish.age,
+            clearance=self._clearance, waypoints_left=leading.waypoints.left,
+            scan_time=math.nan if scan is None else scan.time, reason=self._lead.reason,
         )  # fmt: skip
-        return Decision(velocity=velocity, yaw_rate=self._motion.yaw_rate, pitch=0.0, report=report)
+        return Decision(velocity=velocity, yaw_rate=self._motion.yaw_rate, pitch=pitch, report=report)

@@ -14,11 +14,16 @@ from bluefoot_mpc.types import FloatArray
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class OutlineConfig:
-    """A box with round corners about the trunk's origin that holds the swinging legs too."""
+    """A box with round corners about the trunk's origin that holds the swinging legs too.
 
-    half_length: float = 0.165  # m, to the middle of the rounding
+    Measured in simulation, all geometries of the model, 15 to 20 s each of 0.15 m/s with 0.3 rad/s, 0.5 rad/s
+    in place, backwards and sideways, 0.20 m/s with -0.3 rad/s: 0.228 m along, 0.234 m across, 0.286 m to
+    the corners.
+    """
+
+    half_length: float = 0.16  # m, to the middle of the rounding
     half_width: float = 0.165  # m, to the middle of the rounding
-    rounding: float = 0.04  # m
+    rounding: float = 0.067  # m
 
     def __post_init__(self) -> None:
         require_positive(half_length=self.half_length, half_width=self.half_width)
@@ -42,6 +47,15 @@ class RampConfig:
             every=self.every, steps=self.steps,
         )  # fmt: skip
         require_nonnegative(hold=self.hold)
+
+    def followed(self, gait: Motion, motion: Motion, dt: float) -> Motion:
+        """What the gait does after `dt` seconds of a command, from what it does now."""
+        step, turn = self.acceleration * dt, self.yaw_acceleration * dt
+        return Motion(
+            gait.x + min(max(motion.x - gait.x, -step), step),
+            gait.y + min(max(motion.y - gait.y, -step), step),
+            gait.yaw_rate + min(max(motion.yaw_rate - gait.yaw_rate, -turn), turn),
+        )
 
 
 class Places(NamedTuple):

@@ -1,0 +1,103 @@
+"""What the robot knows of its surroundings: newest sweep, points out of sight, coarse map.
+
+A tick that brings a sweep takes in its points; the map can follow on the next
+tick, so that no tick has to do everything.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bluefoot_mpc.model.parameters import SensorMounts
+from bluefoot_mpc.navigation.config import NavigationConfig
+from bluefoot_mpc.navigation.grid import MapGrid
+from bluefoot_mpc.navigation.memory import PointMemory
+from bluefoot_mpc.navigation.pose import Pose, PoseHistory, pose_of
+from bluefoot_mpc.navigation.scan import LevelScan, ScanReader
+from bluefoot_mpc.types import BodyState, FloatArray, LidarScan, SensorFrame
+
+_NO_SWEEP = "no sweep of the LIDAR yet"
+
+
+class Surroundings:
+    """Gathers what stands around the robot.
+
+    Attributes:
+        pose: of the robot now.
+        scan: newest usable sweep; None before the first.
+        grid: coarse map.
+
+    Args:
+        config: of each part.
+        mounts: where the sensors are.
+    """
+
+    def __init__(self, config: NavigationConfig, mounts: SensorMounts) -> None:
+        self._config = config
+        self._reader = ScanReader(config.scan, mounts)
+        self._history = PoseHistory()
+        self._memory = PointMemory(config.memory)
+        self.grid = MapGrid(config.grid)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._history.reset()
+        self._memory.reset()
+        self.grid.reset()
+        self.pose = Pose(0.0, 0.0, 0.0)
+        self.scan: LevelScan | None = None
+        self._pending: tuple[LevelScan, Pose] | None = None
+        self._fault = _NO_SWEEP
+
+    def step(self, frame: SensorFrame, estimate: BodyState) -> bool:
+        """Take in a frame; True where it brought a usable sweep."""
+        self.pose = pose_of(estimate)
+        self._history.add(estimate)
+        return frame.lidar is not None and self._take(frame.lidar)
+
+    def settle(self) -> bool:
+        """Put the newest sweep into the map, if that has not been done; True where it has just been."""
+        if self._pending is None:
+            return False
+        self.grid.step(*self._pending)
+        self._pending = None
+        return True
+
+    def points(self) -> FloatArray:
+        """(n, 2) m in the robot frame: the nearest things around it, out of sight ones too."""
+        return self.pose.to_robot(self._memory.points)
+
+    def blind(self, time: float) -> str:
+        """Why the robot cannot see at a time (s); empty while it can."""
+        if self.scan is None:
+            return self._fault
+        age = time - self.scan.time
+        if age <= self._config.scan.stale_after:
+            return ""
+        return f"no usable sweep of the LIDAR for {age:.1f} s" + (f": {self._fault}" if self._fault else "")
+
+    def openness(self) -> float:
+        """Mean range to the left less that to the right (m): positive where the left is more open."""
+        if self.scan is None:
+            return 0.0
+        left = self.scan.bearing > 0.0
+        distance = self.scan.distance
+        return float(np.mean(distance[left]) - np.mean(distance[~left]))
+
+    def _take(self, sweep: LidarScan) -> bool:
+        state = self._history.at(sweep.time)
+        result = self._reader.read(sweep, state)
+        if isinstance(result, str):
+            self._fault = result
+            return False
+        if self.scan is not None and not result.time > self.scan.time:
+            self._fault = "the sweep is not newer than the last one"
+            return False
+        self.settle()
+        self._fault = ""
+        self.scan = result
+        pose = pose_of(state)
+        self._memory.step(result, pose)
+        self._pending = (result, pose)
+        return True
