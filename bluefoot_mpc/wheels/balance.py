@@ -12,13 +12,13 @@ import math
 
 import numpy as np
 
-from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.settings import require_positive
 from bluefoot_mpc.types import FloatArray
 from bluefoot_mpc.wheels.balance_config import BalanceConfig
 from bluefoot_mpc.wheels.balance_sensing import BalanceFilter, Imu
-from bluefoot_mpc.wheels.drive import DriveState
-from bluefoot_mpc.wheels.ready import balancing
+from bluefoot_mpc.wheels.drive import DriveState, WheelDrive
+from bluefoot_mpc.wheels.ready import READY, balancing
 from bluefoot_mpc.wheels.regulator import discrete_lqr, discretised
 from bluefoot_mpc.wheels.robot import WheeledRobot, checked
 from bluefoot_mpc.wheels.wheel import rolling_row
@@ -188,6 +188,21 @@ class BalancingDrive:
                 max(heading - lag, min(heading + lag, left)), rate,
             ]
         )  # fmt: skip
+
+
+def make_drive(kind: str, seed: int = 0) -> WheelDrive | BalancingDrive:
+    """A drive for a ready robot, by its name.
+
+    Args:
+        kind: of `bluefoot_mpc.wheels.ready.READY`.
+        seed: of the noise of a balancing robot's sensors.
+
+    Raises:
+        UnknownNameError: there is no such robot.
+    """
+    if kind not in READY:
+        raise UnknownNameError("robot on wheels", kind, READY)
+    return BalancingDrive(seed=seed) if kind == "balancing" else WheelDrive(READY[kind]())
 
 
 def _half_track(robot: WheeledRobot, radius: float) -> float:

@@ -72,11 +72,11 @@ def workspace_dof(robot: WheeledRobot) -> int:
     while True:
         brackets = [_bracket(a, b) for a in basis for b in basis]
         spanned = np.vstack([basis, *brackets]) if len(basis) else basis
-        rank = rank_of(spanned / np.array([1.0, 1.0, 1.0 / robot.size]), 1.0)
-        if rank == len(basis):
-            return rank
-        row = subspaces(scaled(spanned, 1.0 / robot.size)).row
-        basis = row.T / np.array([1.0, 1.0, robot.size])
+        # Twists scale the other way round than rows.
+        span = subspaces(scaled(spanned, 1.0 / robot.size)) if len(spanned) else None
+        if span is None or span.rank == len(basis):
+            return len(basis)
+        basis = scaled(span.row.T, robot.size)
 
 
 def holonomic(robot: WheeledRobot, steering: FloatArray | None = None) -> bool:

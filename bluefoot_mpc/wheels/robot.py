@@ -36,6 +36,8 @@ class WheeledRobot:
         if not self.wheels:
             raise ConfigurationError(f"robot '{self.name}' has no wheels: give at least one")
         require_positive(steering_limit=self.steering_limit)
+        if any(len(group) < 2 for group in self.linked):
+            raise ConfigurationError(f"robot '{self.name}': a linked group needs two wheels or more")
         members = list(chain.from_iterable(self.linked))
         if len(set(members)) != len(members):
             raise ConfigurationError(f"robot '{self.name}': a wheel stands in more than one linked group")
