@@ -194,6 +194,10 @@ class SimConfig:
         require_range(0.0, 1.0, latency=self.latency)
         if self.backlash_deg is not None:
             require_range(0.0, 5.0, backlash_deg=self.backlash_deg)
+        if self.leader.kind and (self.world.name in {"rough", "steps"} or self.world.slope != 0.0):
+            raise ConfigurationError(
+                f"a leader drives on level floor: world '{self.world.name}' is none; take flat or arena"
+            )
         for name, period in (
             ("command_period", self.command_period),
             ("sensors.imu_period", self.sensors.imu_period),

@@ -24,6 +24,7 @@ from bluefoot_mpc.sim.leader_path import Way, circle, figure_of_eight, line
 from bluefoot_mpc.sim.leader_tracking import Manner, Tracker
 from bluefoot_mpc.sim.randomization import stream
 from bluefoot_mpc.types import FloatArray, TruthSample
+from bluefoot_mpc.wheels.balance import BalancingDrive
 from bluefoot_mpc.wheels.drive import WheelDrive
 from bluefoot_mpc.wheels.mobility import delta_M, delta_m
 from bluefoot_mpc.wheels.ready import READY
@@ -84,7 +85,7 @@ class Leader:
         self._place, self._speed = data.qpos[q : q + 3], data.qvel[v : v + 3]
         self._force = data.qfrc_applied[v : v + 3]
         self._every = max(1, round(_PERIOD / period))
-        self._drive = WheelDrive(self.robot)
+        self._drive = _drive(self.robot, seed)
         self._tracker = Tracker(_way(config.leader), _manner(self.robot))
         self.reset()
 
@@ -181,11 +182,20 @@ class Leader:
         self._force[:] = fx * share, fy * share, max(-_TORQUE, min(_TORQUE, torque))
 
     def _show(self) -> None:
-        """Turn the wheels' bodies, which are welded on, to where the drive has them."""
+        """Turn wheels and upper part, which are welded on, to where the drive has them."""
         state, poses = self._drive.state, self._model.body_quat
+        half = 0.5 * state.tilt
+        poses[self._frame] = math.cos(half), 0.0, math.sin(half), 0.0
         steering, angles = state.steering.tolist(), state.wheel_angle.tolist()
         for index, (body, wheel) in enumerate(zip(self._wheels, self.robot.wheels, strict=True)):
             poses[body] = wheel_quaternion(wheel, steering[index], angles[index])
+
+
+def _drive(robot: WheeledRobot, seed: int) -> WheelDrive | BalancingDrive:
+    """What turns the wheels: motors alone, or motors that balance too."""
+    if robot.name != "balancing":
+        return WheelDrive(robot)
+    return BalancingDrive(robot, seed=int(stream(seed, "leader.balance").integers(1 << 31)))
 
 
 def _way(config: LeaderConfig) -> Way:

@@ -96,6 +96,8 @@ CHASSIS: dict[str, tuple[Part, ...]] = {
         Part("box", (0.016, 0.085, 0.006), (0.0, 0.0, 0.070)),
         Part("disc", (0.016, 0.016, 0.012), (0.090, 0.0, 0.090)),
         Part("disc", (0.016, 0.016, 0.012), (-0.090, 0.0, 0.090)),
+        Part("disc", (0.006, 0.006, 0.016), (0.0, 0.072, 0.048)),
+        Part("disc", (0.006, 0.006, 0.016), (0.0, -0.072, 0.048)),
     ),
 }
 """What stands on the wheels of each kind; none of it touches the floor."""
