@@ -39,6 +39,7 @@ def replay(command: ReplayCommand) -> Outcome:
 def _show(command: ReplayCommand, log: RunLog) -> None:
     if not log.telemetry:
         raise LogError(f"{log.path} holds nothing to show: not one tick of the controller is readable")
+    log.look_through()
     try:
         show_replay(log, view=command.view, html=command.html)
     except OSError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,10 @@ from zstandard import ZstdError
 from bluefoot_mpc.exceptions import LogError
 from bluefoot_mpc.runtime.codec import decode
 from bluefoot_mpc.runtime.data import RunData
+from bluefoot_mpc.runtime.packed_pictures import TOPIC as CAMERA_TOPIC
+from bluefoot_mpc.runtime.packed_pictures import PackedPicture, unpack
 from bluefoot_mpc.runtime.recorder import CONFIG_TOPIC, LIBRARY, OUTCOME, RECORD_CLASSES, START
+from bluefoot_mpc.types import SensorFrame
 
 log = logging.getLogger(__name__)
 
@@ -39,10 +42,33 @@ class RunLog(RunData):
         path: the file.
         truncated: True when the file ends before its end mark: the writer was
             killed, or the copy is incomplete; the lists hold what is readable.
+        packed: the camera's pictures by the time (s) of the frame that they came
+            with; ``frames`` are without them, since unpacked they would not fit
+            into memory. (Logs of earlier versions have them in their frames.)
     """
 
     path: Path
     truncated: bool = False
+    packed: dict[float, PackedPicture] = field(default_factory=dict, repr=False)
+
+    def frame(self, index: int) -> SensorFrame:
+        """A sensor frame as the controller got it, its picture included.
+
+        Raises:
+            LogError: its picture is not readable.
+        """
+        frame = self.frames[index]
+        picture = self.packed.get(frame.time)
+        return frame if picture is None else replace(frame, camera=picture.image())
+
+    def look_through(self) -> None:
+        """Keep a few of the pictures for a report, as the run's loop did.
+
+        Raises:
+            LogError: a picture is not readable.
+        """
+        for index, telemetry in enumerate(self.telemetry if self.packed else ()):
+            self.keep_picture(self.frame(index), telemetry)
 
 
 @dataclass(kw_only=True, slots=True)
@@ -52,6 +78,7 @@ class _Contents:
     library: str = ""
     topics: dict[int, str] = field(default_factory=dict)
     records: dict[str, list[Any]] = field(default_factory=lambda: {topic: [] for topic in RECORD_CLASSES})
+    packed: dict[float, PackedPicture] = field(default_factory=dict)
     config: dict[str, Any] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
 
@@ -118,6 +145,9 @@ def _take(record: McapRecord, contents: _Contents) -> None:
         topic = contents.topics[record.channel_id]
         if topic == CONFIG_TOPIC:
             contents.config = orjson.loads(record.data)
+        elif topic == CAMERA_TOPIC:
+            picture = unpack(record.data)
+            contents.packed[picture.frame] = picture
         elif topic in RECORD_CLASSES:
             contents.records[topic].append(decode(RECORD_CLASSES[topic], record.data))
 
@@ -129,6 +159,7 @@ def _assemble(file: Path, contents: _Contents, truncated: bool) -> RunLog:
     return RunLog(
         path=file,
         truncated=truncated,
+        packed=contents.packed,
         frames=frames,
         commands=contents.records["/command"],
         telemetry=contents.records["/telemetry"],

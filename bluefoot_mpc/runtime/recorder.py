@@ -1,10 +1,11 @@
 """Writes a run to an MCAP file while it happens.
 
 One topic per kind of record and one for the configuration, as JSON with a
-schema, so that Foxglove opens the file as it is. Text is made of a few ticks
+schema, so that Foxglove opens the file as it is; the camera's pictures have a
+topic of their own (`bluefoot_mpc.runtime.packed_pictures`). Text is made of a few ticks
 at a time, which takes half the time that it takes tick by tick, when the
-controller has just had the processor's caches. Packing and compressing happen
-in a thread, half a second of the run at a time, and every packed half second
+controller has just had the processor's caches. Packing and compressing, of
+pictures too, happen in a thread, half a second of the run at a time, and every packed half second
 goes to the file at once. So a killed process loses little, and
 `bluefoot_mpc.runtime.log.read_log` reads what is there.
 """
@@ -16,6 +17,7 @@ import contextlib
 import queue
 import threading
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any
@@ -24,11 +26,13 @@ import orjson
 from mcap.writer import CompressionType, Writer
 
 from bluefoot_mpc.exceptions import LogError
+from bluefoot_mpc.runtime import packed_pictures
 from bluefoot_mpc.runtime.codec import encode
 from bluefoot_mpc.runtime.data import CommandRecord
 from bluefoot_mpc.runtime.schema import json_schema
 from bluefoot_mpc.runtime.versions import installed_versions
 from bluefoot_mpc.types import (
+    CameraImage,
     JointCommand,
     MotionCommand,
     SafetyRequest,
@@ -56,7 +60,19 @@ _PORTION = 0.1
 _TINY = 1e-6
 _QUEUE_LENGTH = 64
 
-_Message = tuple[int, int, bytes]
+
+@dataclass(frozen=True, slots=True)
+class _Picture:
+    """A picture and the time (s) of the frame that it came with."""
+
+    image: CameraImage
+    frame: float
+
+    def text(self) -> bytes:
+        return packed_pictures.pack(self.image, self.frame)
+
+
+_Message = tuple[int, int, bytes | _Picture]
 
 
 class Recorder:
@@ -114,7 +130,12 @@ class Recorder:
             if not 0.0 <= time - self._batch_start < BATCH - _TINY:
                 self._hand_over()
                 self._batch_start = time
-        self._put("/frame", time, frame)
+        image = frame.camera
+        if image is None or not packed_pictures.can_be_packed(image):
+            self._put("/frame", time, frame)
+            return
+        self._put("/frame", time, replace(frame, camera=None))
+        self._put(packed_pictures.TOPIC, time, _Picture(image, time))
 
     def command(self, motion: MotionCommand, joints: JointCommand, safe: SafetyRequest) -> None:
         """Record what went into the controller beside the newest frame, and its answer.
@@ -190,10 +211,10 @@ class Recorder:
         self._portion.append((topic, time, record))
 
     def _make_text(self) -> None:
-        """Make messages of the records that wait; what is bytes is text already."""
+        """Make messages of the records that wait; what is bytes is text already, pictures take too long."""
         portion, self._portion = self._portion, []
         for topic, time, record in portion:
-            text = record if isinstance(record, bytes) else encode(record)
+            text = record if isinstance(record, bytes | _Picture) else encode(record)
             self._batch.append((self._channels[topic], max(0, round(time * 1e9)), text))
 
     def _hand_over(self) -> None:
@@ -207,7 +228,8 @@ class Recorder:
                 continue
             try:
                 for channel, time, data in batch:
-                    self._writer.add_message(channel, time, data, time)
+                    text = data if isinstance(data, bytes) else data.text()
+                    self._writer.add_message(channel, time, text, time)
                 self._writer.flush()
             except OSError as error:
                 self._error = error
@@ -236,9 +258,11 @@ def _start_writer(file: IO[bytes], period: float | None) -> Any:
 def _register(writer: Any) -> dict[str, int]:
     schemas = {topic: (cls.__name__, json_schema(cls)) for topic, cls in RECORD_CLASSES.items()}
     schemas[CONFIG_TOPIC] = ("Config", {"type": "object", "properties": {}})
+    named = {topic: (f"bluefoot.{name}", schema) for topic, (name, schema) in schemas.items()}
+    named[packed_pictures.TOPIC] = (packed_pictures.SCHEMA_NAME, packed_pictures.SCHEMA)
     return {
         topic: writer.register_channel(
-            topic, "json", writer.register_schema(f"bluefoot.{name}", "jsonschema", orjson.dumps(schema))
+            topic, "json", writer.register_schema(name, "jsonschema", orjson.dumps(schema))
         )
-        for topic, (name, schema) in schemas.items()
+        for topic, (name, schema) in named.items()
     }

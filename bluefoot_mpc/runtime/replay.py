@@ -9,6 +9,7 @@ import numpy as np
 
 from bluefoot_mpc.exceptions import LogError
 from bluefoot_mpc.runtime.data import RunData
+from bluefoot_mpc.runtime.log import RunLog
 from bluefoot_mpc.types import JOINTS, JointCommand, MotionCommand, SafetyRequest, SensorFrame
 
 Step = Callable[[SensorFrame, MotionCommand, SafetyRequest], JointCommand]
@@ -82,7 +83,9 @@ def rethink(log: RunData, make_step: Callable[[], Step]) -> RethinkReport:
         raise LogError("the log holds no commands to compare with")
     step = make_step()
     differing, largest, first = 0, 0.0, None
-    for frame, record in zip(log.frames, log.commands, strict=False):
+    ticks, frame_at = min(len(log.frames), len(log.commands)), _frame_at(log)
+    for index, record in enumerate(log.commands[:ticks]):
+        frame = frame_at(index)
         if frame.time != record.time:
             raise LogError(f"the log is damaged: no command for the frame at {frame.time:.3f} s")
         answer = step(frame, record.motion, record.safety)
@@ -91,8 +94,12 @@ def rethink(log: RunData, make_step: Callable[[], Step]) -> RethinkReport:
             differing += 1
             first = first or difference
             largest = max(largest, _distance(record.joints, answer))
-    ticks = min(len(log.frames), len(log.commands))
     return RethinkReport(ticks=ticks, differing=differing, max_difference=largest, first=first)
+
+
+def _frame_at(log: RunData) -> Callable[[int], SensorFrame]:
+    """What gives the frames as the controller got them, with the pictures that a log has packed."""
+    return log.frame if isinstance(log, RunLog) else log.frames.__getitem__
 
 
 def _first_difference(
@@ -132,7 +139,7 @@ class ReplayRobot:
         if not log.frames:
             raise LogError("the log holds no sensor frames to replay")
         self.period = log.period
-        self._frames = log.frames
+        self._frames, self._frame_at = log.frames, _frame_at(log)
         self._next = 0
 
     @property
@@ -162,6 +169,6 @@ class ReplayRobot:
     def _advance(self) -> SensorFrame:
         if self.finished:
             raise LogError(f"the recorded run ends at {self._frames[-1].time:.3f} s")
-        frame = self._frames[self._next]
+        frame = self._frame_at(self._next)
         self._next += 1
         return frame

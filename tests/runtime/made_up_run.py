@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bluefoot_mpc.runtime.data import CommandRecord, RunData
+from bluefoot_mpc.runtime.log import RunLog
 from bluefoot_mpc.types import (
     BodyState,
     CameraImage,
@@ -162,11 +163,15 @@ def same(a: Any, b: Any) -> bool:
 
 
 def same_runs(a: RunData, b: RunData) -> bool:
-    """True when all records of two runs are equal."""
-    return all(
-        len(a.records(topic)) == len(b.records(topic)) and all(map(same, a.records(topic), b.records(topic)))
-        for topic in ("frame", "command", "telemetry", "truth")
-    )
+    """True when all records of two runs are equal, the pictures that a log has packed included."""
+    kept = [(frames_of(a), frames_of(b))]
+    kept += [(a.records(topic), b.records(topic)) for topic in ("command", "telemetry", "truth")]
+    return all(len(one) == len(other) and all(map(same, one, other)) for one, other in kept)
+
+
+def frames_of(run: RunData) -> list[SensorFrame]:
+    """A run's frames, with their pictures."""
+    return [run.frame(index) for index in range(len(run.frames))] if isinstance(run, RunLog) else run.frames
 
 
 def record_ticks(recorder: Any, run: RunData) -> None:

@@ -40,6 +40,7 @@ def test_a_run_comes_back_as_it_was(tmp_path: Path) -> None:
 
 def test_an_independent_reader_understands_the_file(tmp_path: Path) -> None:
     run = make_run(60)
+    pictures = sum(frame.camera is not None for frame in run.frames)
     with Recorder(tmp_path / "log.mcap", CONFIG) as recorder:
         record_ticks(recorder, run)
     with (tmp_path / "log.mcap").open("rb") as stream:
@@ -47,16 +48,18 @@ def test_an_independent_reader_understands_the_file(tmp_path: Path) -> None:
         summary = reader.get_summary()
         assert summary is not None
         topics = {channel.topic: channel for channel in summary.channels.values()}
-        assert set(topics) == {"/frame", "/command", "/telemetry", "/truth", "/config"}
+        assert set(topics) == {"/frame", "/camera", "/command", "/telemetry", "/truth", "/config"}
         assert {channel.message_encoding for channel in topics.values()} == {"json"}
         for schema in summary.schemas.values():
             assert schema.encoding == "jsonschema"
             assert orjson.loads(schema.data)["type"] == "object"
         assert summary.statistics is not None
-        assert summary.statistics.message_count == 4 * 60 + 1
+        assert summary.statistics.message_count == 4 * 60 + 1 + pictures
         for _, channel, message in reader.iter_messages():
             data = orjson.loads(message.data)
-            if channel.topic != "/config":
+            if channel.topic == "/camera":
+                assert message.log_time == round(data["frame"] * 1e9)
+            elif channel.topic != "/config":
                 assert message.log_time == round(data["time"] * 1e9)
 
 
