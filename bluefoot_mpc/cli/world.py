@@ -17,7 +17,6 @@ from bluefoot_mpc.sim.worlds.files import write_plan
 from bluefoot_mpc.sim.worlds.make import world_plan
 from bluefoot_mpc.sim.worlds.plan import WorldPlan
 
-
 _SCENARIOS = {"hidden": "approach", "arena": "follow"}
 """Which scenario a kind of world was made for, where it is not ``wander``."""
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from bluefoot_mpc.sim.worlds.layout import PASSAGE, WOOD, Colour, Layout, Point, box, cylinder, pick
 from bluefoot_mpc.sim.worlds.plan import Solid
-from bluefoot_mpc.sim.worlds.rooms import random_point, some_bounds
+from bluefoot_mpc.sim.worlds.rooms import by_wall, random_point, some_bounds
 
 SEAT_HEIGHT = 0.45
 """m, middle of a seat."""
@@ -19,27 +19,41 @@ SEAT_HEIGHT = 0.45
 Make = Callable[[Point, float], list[Solid]]
 """Makes a thing of several solids at a place (m) and a yaw (rad)."""
 
-_TRIES = 100
+_TRIES = 150
+_BY_WALL = 0.03  # m between a wall and what stands by it
 _SEAT, _SEAT_THICKNESS, _LEG = 0.42, 0.04, 0.018  # m: edge, height, radius of a leg
 _BACK_HEIGHT = 0.40
 _TABLE_HEIGHT, _TABLE_THICKNESS, _TABLE_LEG = 0.72, 0.03, 0.03
 _DARK_WOOD: Colour = (0.45, 0.31, 0.20)
 
 
+@dataclass(frozen=True, kw_only=True, slots=True)
+class _Thing:
+    """What is to be placed."""
+
+    make: Make
+    reach: float  # m from its middle to its farthest corner
+    half: float  # m from its middle to its back, which may stand by a wall
+    by_wall: float  # share of those that stand by a wall
+
+
 def chairs(rng: np.random.Generator) -> Layout:
-    """A room with a table, chairs about the room and one at the table, and boxes."""
+    """A room with a table, chairs about the room, by its walls and one at the table, and boxes."""
     layout = Layout(some_bounds(rng, (6.0, 7.2), (5.2, 6.2)))
     layout.enclose()
     _place_table(layout, rng)
     for _ in range(int(rng.integers(3, 6))):
-        _place(layout, rng, partial(chair, layout.name("chair")), 0.35)
+        make = partial(chair, layout.name("chair"))
+        _place(layout, rng, _Thing(make=make, reach=0.35, half=0.5 * _SEAT + 0.01, by_wall=0.4))
     for _ in range(int(rng.integers(1, 4))):
         size = (
-            float(rng.uniform(0.25, 0.55)),
-            float(rng.uniform(0.25, 0.40)),
+            float(rng.uniform(0.30, 0.55)),
+            float(rng.uniform(0.30, 0.40)),
             float(rng.uniform(0.35, 0.55)),
         )
-        _place(layout, rng, partial(_crate, layout.name("box"), pick(rng), size), 0.5 * math.hypot(*size[:2]))
+        make = partial(_crate, layout.name("box"), pick(rng), size)
+        reach, half = 0.5 * math.hypot(*size[:2]), 0.5 * size[0]
+        _place(layout, rng, _Thing(make=make, reach=reach, half=half, by_wall=0.6))
     return layout
 
 
@@ -75,29 +89,33 @@ def _place_table(layout: Layout, rng: np.random.Generator) -> None:
     name = layout.name("table")
     if rng.random() < 0.3:
         radius = float(rng.uniform(0.40, 0.55))
-        _place(layout, rng, lambda at, _: round_table(name, at, radius), radius)
+        top = _Thing(make=lambda at, _: round_table(name, at, radius), reach=radius, half=radius, by_wall=0.0)
+        _place(layout, rng, top)
         return
-    edge, side = float(rng.uniform(1.38, 1.50)), int(rng.integers(4))
-    drawn_up = layout.name("chair") if rng.random() < 0.5 else ""
+    edge = float(rng.uniform(1.38, 1.50))
+    drawn_up = layout.name("chair") if rng.random() < 0.6 else ""
 
     def make(at: Point, yaw: float) -> list[Solid]:
         solids = table(name, at, yaw, edge)
         if drawn_up:
             # In the middle of a side, half under the top: too narrow on both sides to slip by.
-            turn = yaw + 0.5 * math.pi * side
-            solids += chair(drawn_up, _shifted(at, turn, (0.5 * edge + 0.02, 0.0)), turn + math.pi)
+            solids += chair(drawn_up, _shifted(at, yaw, (0.5 * edge + 0.02, 0.0)), yaw + math.pi)
         return solids
 
-    _place(layout, rng, make, 0.75 * edge)
+    _place(layout, rng, _Thing(make=make, reach=0.75 * edge, half=0.5 * edge, by_wall=0.5))
 
 
-def _place(layout: Layout, rng: np.random.Generator, make: Make, reach: float) -> bool:
-    """Put a thing of several solids where there is room for it; False where none was found."""
+def _place(layout: Layout, rng: np.random.Generator, thing: _Thing) -> bool:
+    """Put a thing where there is room for it; False where none was found."""
     for _ in range(_TRIES):
-        at = random_point(layout, rng, reach + PASSAGE)
-        things = make(at, float(rng.uniform(-math.pi, math.pi)))
-        if layout.has_room(things, by_walls=True):  # they are far enough from them already
-            layout.add(*things)
+        if rng.random() < thing.by_wall:
+            at, yaw = by_wall(layout, rng, thing.half, _BY_WALL)
+        else:
+            at, yaw = random_point(layout, rng, thing.reach + PASSAGE), float(rng.uniform(-math.pi, math.pi))
+        solids = thing.make(at, yaw)
+        # From the outer walls they are far enough away already, or close to one on purpose.
+        if layout.has_room(solids, by_walls=True):
+            layout.add(*solids)
             return True
     return False
 

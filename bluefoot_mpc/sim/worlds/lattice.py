@@ -68,11 +68,16 @@ class Lattice:
     def layout(self) -> Layout:
         """Walls on every closed edge of the used cells, straight runs in one piece.
 
-        The bounds end at the outermost lines.
+        The bounds end at the outermost walls.
         """
-        half = 0.5 * WALL_THICKNESS
-        layout = Layout((self.x[0] + half, self.y[0] + half, self.x[-1] - half, self.y[-1] - half))
-        used = self.used()
+        half, used = 0.5 * WALL_THICKNESS, self.used()
+        columns, rows = [cell[0] for cell in used], [cell[1] for cell in used]
+        layout = Layout(
+            (
+                float(self.x[min(columns)]) + half, float(self.y[min(rows)]) + half,
+                float(self.x[max(columns) + 1]) - half, float(self.y[max(rows) + 1]) - half,
+            )
+        )  # fmt: skip
         for column in range(self.columns + 1):
             closed = [self._is_closed((column - 1, row), (column, row), used) for row in range(self.rows)]
             for low, high in _runs(closed):

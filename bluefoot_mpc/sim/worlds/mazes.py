@@ -7,15 +7,17 @@ import numpy as np
 from bluefoot_mpc.sim.worlds.lattice import STEPS, Cell, Lattice, lines
 from bluefoot_mpc.sim.worlds.layout import Layout
 
-_MAZE_SPACING = (1.25, 1.50)
-_HALL_SPACING = (1.30, 1.55)
+_SPACING = (1.32, 1.50)
 """m between the middles of walls, which are 0.10 m thick."""
+
+_CORRIDORS = (3, 2, 2, 1, 1)
+"""Cells of the blind corridors that are asked for; one cell is a niche."""
 
 
 def maze(rng: np.random.Generator) -> Layout:
-    """A maze of about four by four cells: one way between any two, but for at most one more opening."""
-    columns, rows = ((4, 4), (5, 3), (3, 5))[int(rng.choice(3, p=(0.5, 0.25, 0.25)))]
-    lattice = Lattice(lines(rng, columns, _MAZE_SPACING), lines(rng, rows, _MAZE_SPACING))
+    """A maze of twelve to sixteen cells: one way between any two, but for at most one more opening."""
+    columns, rows = ((4, 3), (3, 4), (4, 4), (5, 3))[int(rng.integers(4))]
+    lattice = Lattice(lines(rng, columns, _SPACING), lines(rng, rows, _SPACING))
     _carve(lattice, rng)
     for _ in range(int(rng.integers(0, 2))):
         cells = list(lattice.cells())
@@ -30,11 +32,11 @@ def maze(rng: np.random.Generator) -> Layout:
 def dead_ends(rng: np.random.Generator) -> Layout:
     """A hall with blind corridors, niches, and a trap of three walls in its middle."""
     while True:
-        lattice = Lattice(lines(rng, 5, _HALL_SPACING), lines(rng, 5, _HALL_SPACING))
+        lattice = Lattice(lines(rng, 5, _SPACING), lines(rng, 5, _SPACING))
         corner = (int(rng.integers(0, 3)), int(rng.integers(0, 3)))
         hall = {(corner[0] + c, corner[1] + r) for c in range(3) for r in range(3)}
         _open(lattice, hall)
-        blind = [_grow(lattice, hall, length, rng) for length in (3, 3, 2, 1, 1)]
+        blind = [_grow(lattice, hall, length, rng) for length in _CORRIDORS]
         if sum(length >= 2 for length in blind) >= 2 and sum(blind) >= 6:
             break
     trap = (corner[0] + 1, corner[1] + 1)

@@ -48,7 +48,8 @@ def arena(rng: np.random.Generator) -> Layout:
     side = rng.uniform(0.9, 1.2, 2)
     layout = Layout((x0 - room_left, y0 - float(side[0]), x1 + room_ahead, y1 + float(side[1])))
     colours = [WALL] * 4
-    colours[int(rng.integers(4))] = NEAR_MARKER
+    # Mostly where the robot looks while it follows.
+    colours[int(rng.choice(4, p=(0.4, 0.25, 0.1, 0.25)))] = NEAR_MARKER
     layout.enclose(colours)
     for _ in range(int(rng.integers(5, 8))):
         _add_along_wall(layout, rng)
@@ -74,6 +75,26 @@ def random_point(layout: Layout, rng: np.random.Generator, margin: float) -> Poi
     """
     x0, y0, x1, y1 = layout.bounds
     return float(rng.uniform(x0 + margin, x1 - margin)), float(rng.uniform(y0 + margin, y1 - margin))
+
+
+def by_wall(layout: Layout, rng: np.random.Generator, half: float, gap: float) -> tuple[Point, float]:
+    """A place by an outer wall and a passage away from the others, m, and the yaw into the room, rad.
+
+    Args:
+        layout: whose bounds count.
+        rng: to draw from.
+        half: m, from the middle of what is to stand there to its sides.
+        gap: m, to be left to the wall.
+    """
+    x0, y0, x1, y1 = layout.bounds
+    x, y = random_point(layout, rng, half + PASSAGE)
+    inset = half + gap
+    return (
+        ((x0 + inset, y), 0.0),
+        ((x, y0 + inset), 0.5 * math.pi),
+        ((x1 - inset, y), math.pi),
+        ((x, y1 - inset), -0.5 * math.pi),
+    )[int(rng.integers(4))]
 
 
 def add_cylinder(layout: Layout, rng: np.random.Generator) -> bool:
@@ -110,16 +131,12 @@ def add_stub(layout: Layout, rng: np.random.Generator) -> bool:
 
 def _add_along_wall(layout: Layout, rng: np.random.Generator) -> bool:
     """Put a cylinder or a box against an outer wall; False where there was no room for it."""
-    x0, y0, x1, y1 = layout.bounds
     kind = "cylinder" if rng.random() < 0.5 else "box"
     name, colour = layout.name(kind), pick(rng)
     for _ in range(_TRIES):
-        half = float(rng.uniform(0.10, 0.30))
+        half, height = float(rng.uniform(0.10, 0.30)), float(rng.uniform(0.35, 0.6))
         # Some touch the wall, some leave a gap that is clearly too narrow.
-        inset = half + float(rng.choice([0.02, 0.15]))
-        x, y = random_point(layout, rng, inset)
-        at = ((x1 - inset, y), (x, y1 - inset), (x0 + inset, y), (x, y0 + inset))[int(rng.integers(4))]
-        height = float(rng.uniform(0.35, 0.6))
+        at, _ = by_wall(layout, rng, half, float(rng.choice([0.02, 0.15])))
         thing = (
             cylinder(name, at, half, height, colour)
             if kind == "cylinder"
