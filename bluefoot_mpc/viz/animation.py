@@ -12,6 +12,7 @@ import numpy as np
 from bluefoot_mpc.exceptions import BlueFootError
 from bluefoot_mpc.types import LEGS, FloatArray
 from bluefoot_mpc.viz.packing import pack, pack_bytes, stride_for
+from bluefoot_mpc.viz.page import template_text
 from bluefoot_mpc.viz.scene import Node, RobotScene, scene_commands
 from bluefoot_mpc.viz.series import RunSeries
 from bluefoot_mpc.viz.style import LEG_COLOURS
@@ -71,6 +72,11 @@ def viewer_script() -> str:
         if file.is_file():
             return file.read_text(encoding="utf-8")
     raise BlueFootError("meshcat's viewer (viewer/dist/main.min.js) is missing: install meshcat >= 0.3.2")
+
+
+def player_script() -> str:
+    """The JavaScript of the replay's and the live view's own part, surroundings included."""
+    return template_text("surroundings.js") + template_text("player.js")
 
 
 def _node(node: Node) -> dict[str, Any]:

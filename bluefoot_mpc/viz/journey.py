@@ -64,7 +64,7 @@ def journey_of(run: RunData, series: RunSeries, robot: RobotModel) -> Journey | 
     guided = extract_guided(run, series, mounts)
     if guided is None:
         return None
-    plan, config = plan_of(run), navigation_config(run.config)
+    plan, config = plan_of(run.config), navigation_config(run.config)
     n = len(series.time)
     scans = read_scans(run, n, mounts, config.scan, most=_MOST_SCANS)
     pictures = kept_pictures(run)

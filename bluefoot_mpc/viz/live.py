@@ -11,12 +11,16 @@ import numpy as np
 
 from bluefoot_mpc.geometry import rpy_from_quaternion
 from bluefoot_mpc.model.robot import RobotModel
-from bluefoot_mpc.types import SensorFrame, Telemetry, TruthSample
-from bluefoot_mpc.viz.animation import scene_data, viewer_script
+from bluefoot_mpc.types import LidarScan, SensorFrame, Telemetry, TruthSample
+from bluefoot_mpc.viz.animation import player_script, scene_data, viewer_script
 from bluefoot_mpc.viz.live_link import LiveLink
+from bluefoot_mpc.viz.live_surroundings import LiveSurroundings
+from bluefoot_mpc.viz.packing import pack
 from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
 from bluefoot_mpc.viz.scene import build_scene
 from bluefoot_mpc.viz.series import estimated_feet, estimated_q, from_virtual
+from bluefoot_mpc.viz.stage import Stage, stage_data
+from bluefoot_mpc.viz.stage_motion import RAYS
 
 _LOG = logging.getLogger(__name__)
 
@@ -42,21 +46,23 @@ class LiveView:
 
     Args:
         robot: the robot to draw.
+        stage: what stands and moves around it.
 
     Attributes:
         url: address of the page; empty where there is none.
     """
 
-    def __init__(self, robot: RobotModel) -> None:
+    def __init__(self, robot: RobotModel, stage: Stage | None = None) -> None:
         self.url = ""
         self._radius = robot.parameters.legs.foot_radius
+        self._around = LiveSurroundings(stage or Stage(), robot.parameters.sensors.lidar)
         self._newest: tuple[Telemetry, TruthSample | None] | None = None
         self._wake = threading.Event()
         self._ending = False
         self._link: LiveLink | None = None
         self._thread: threading.Thread | None = None
         try:
-            self._link = LiveLink(live_page(robot))
+            self._link = LiveLink(live_page(robot, stage))
         except OSError as error:
             _LOG.warning("no live view: %s", error)
             return
@@ -83,10 +89,13 @@ class LiveView:
             output: what the controller made of it.
             truth: the simulator's truth at the frame.
         """
-        self.show(output.telemetry, truth)
+        self.show(output.telemetry, truth, frame.lidar)
 
-    def show(self, telemetry: Telemetry, truth: TruthSample | None = None) -> None:
-        """Show a tick by its telemetry; returns at once."""
+    def show(
+        self, telemetry: Telemetry, truth: TruthSample | None = None, scan: LidarScan | None = None
+    ) -> None:
+        """Show a tick by its telemetry and its sweep; returns at once."""
+        self._around.note(telemetry, truth, scan)
         self._newest = (telemetry, truth)
         self._wake.set()
 
@@ -113,20 +122,28 @@ class LiveView:
             started = time.monotonic()
             newest, self._newest = self._newest, None
             if newest is not None:
-                link.send(live_state(*newest))
+                link.send(live_state(*newest) | self._around.state(*newest))
             time.sleep(max(0.0, 1.0 / RATE - (time.monotonic() - started)))
 
 
-def live_page(robot: RobotModel) -> str:
-    """The page that draws a robot's states as they come."""
+def live_page(robot: RobotModel, stage: Stage | None = None) -> str:
+    """The page that draws a robot's states as they come.
+
+    Args:
+        robot: the robot to draw.
+        stage: what stands and moves around it.
+    """
+    data = scene_data(build_scene(robot), robot.parameters.legs.foot_radius) | stage_data(stage or Stage())
+    # Sweeps come ready as points; the page only makes room for them.
+    data["sweeps"] = {"mount": [0.0, 0.0, 0.0], "bearing": pack(np.zeros(RAYS))}
     return render(
         "live.html.j2",
         title=f"{robot.parameters.name}, live",
         has_truth=True,
         plots_follow=False,
-        run_data=embed_json(scene_data(build_scene(robot), robot.parameters.legs.foot_radius)),
+        run_data=embed_json(data),
         viewer_script=embed_script(viewer_script()),
-        player_script=embed_script(template_text("player.js")),
+        player_script=embed_script(player_script()),
         live_script=embed_script(template_text("live.js")),
     )
 

@@ -11,11 +11,14 @@ from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.settings import build
-from bluefoot_mpc.viz.animation import animation_data, viewer_script
+from bluefoot_mpc.viz.animation import player_script, viewer_script
+from bluefoot_mpc.viz.journey import journey_of
 from bluefoot_mpc.viz.live import LiveView
 from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
-from bluefoot_mpc.viz.scene import build_scene
+from bluefoot_mpc.viz.report import figures, plotly_script
 from bluefoot_mpc.viz.series import extract
+from bluefoot_mpc.viz.stage import stage_of
+from bluefoot_mpc.viz.stage_motion import replay_data
 
 _WAIT_FOR_PAGE = 60.0  # s
 
@@ -42,7 +45,7 @@ def replay(
     if html is not None:
         html.write_text(replay_html(log, robot), encoding="utf-8")
     if view:
-        live = LiveView(robot)
+        live = LiveView(robot, stage_of(log.config))
         try:
             if announce is not None and live.url:
                 announce(live.url)
@@ -52,18 +55,27 @@ def replay(
 
 
 def replay_html(run: RunData, robot: RobotModel) -> str:
-    """The 3D replay alone as a self-contained page."""
-    legs = robot.parameters.legs
+    """The 3D replay as a self-contained page; below it, how the robot found its way where it did."""
     series = extract(run, robot.parameters.servo.stall_torque)
     named = run.config.get("run", {})
+    data = replay_data(run, series, robot)
+    journey = journey_of(run, series, robot) if len(series.time) else None
+    panels = journey.panels if journey is not None else ()
     return render(
         "page.html.j2",
         title=f"{named.get('scenario', 'run')}, seed {named.get('seed', '–')}",
         has_truth=series.has_truth,
-        plots_follow=False,
-        run_data=embed_json(animation_data(build_scene(robot), series, legs.foot_radius)),
+        has_sweeps=bool(data.get("sweeps")),
+        plots_follow=bool(panels),
+        panels=panels,
+        strip=journey.strip if journey is not None else (),
+        strip_after=journey.strip_after if journey is not None else "",
+        run_data=embed_json(data),
+        figures=embed_json(figures(panels, series)) if panels else "",
         viewer_script=embed_script(viewer_script()),
-        player_script=embed_script(template_text("player.js")),
+        plotly_script=embed_script(plotly_script()) if panels else "",
+        player_script=embed_script(player_script()),
+        report_script=embed_script(template_text("report.js")) if panels else "",
     )
 
 
@@ -85,7 +97,8 @@ def play(run: RunData, live: LiveView, *, speed: float = 1.0, wait: float = _WAI
             return
         due = start + (telemetry.time - run.telemetry[0].time) / speed
         time.sleep(max(0.0, due - time.monotonic()))
-        live.show(telemetry, run.truth[index] if index < len(run.truth) else None)
+        scan = run.frames[index].lidar if index < len(run.frames) else None
+        live.show(telemetry, run.truth[index] if index < len(run.truth) else None, scan)
 
 
 def robot_of(run: RunData) -> RobotModel:

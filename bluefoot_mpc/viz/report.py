@@ -10,15 +10,15 @@ from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.settings import dump_toml
 from bluefoot_mpc.viz import plots, plots_ground, plots_level, plots_machine, plots_plan
-from bluefoot_mpc.viz.animation import animation_data, viewer_script
+from bluefoot_mpc.viz.animation import player_script, viewer_script
 from bluefoot_mpc.viz.journey import journey_of
 from bluefoot_mpc.viz.level_series import extract_leveling
 from bluefoot_mpc.viz.packing import stretches
 from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
 from bluefoot_mpc.viz.plan_series import extract_plans
 from bluefoot_mpc.viz.plots import Panel
-from bluefoot_mpc.viz.scene import build_scene
 from bluefoot_mpc.viz.series import RunSeries, extract
+from bluefoot_mpc.viz.stage_motion import replay_data
 from bluefoot_mpc.viz.style import BAD, NEUTRAL
 from bluefoot_mpc.viz.verdict import facts, number, tiles, verdict
 
@@ -61,7 +61,7 @@ def report_html(
     panels = _panels(run, series, stall_torque, summary.get("figures") or {}) if has_ticks else []
     panels = [*(journey.panels if journey is not None else ()), *panels]
     judged = verdict(summary, checks)
-    data = animation_data(build_scene(robot), series, robot.parameters.legs.foot_radius) if has_ticks else {}
+    data = replay_data(run, series, robot) if has_ticks else {}
     return render(
         "report.html.j2",
         title=f"{judged.word}: {summary.get('scenario') or 'run'}, seed {summary.get('seed')}",
@@ -71,15 +71,16 @@ def report_html(
         tiles=tiles(summary, stall_torque, run.period, checks),
         has_ticks=has_ticks,
         has_truth=series.has_truth,
+        has_sweeps=bool(data.get("sweeps")),
         plots_follow=True,
         panels=panels,
         strip=journey.strip if journey is not None else (),
         strip_after=journey.strip_after if journey is not None else "",
         run_data=embed_json(data),
-        figures=embed_json(_figures(panels, series)),
+        figures=embed_json(figures(panels, series)),
         viewer_script=embed_script(viewer_script()) if has_ticks else "",
-        plotly_script=embed_script(_plotly_script()),
-        player_script=embed_script(template_text("player.js")),
+        plotly_script=embed_script(plotly_script()),
+        player_script=embed_script(player_script()),
         report_script=embed_script(template_text("report.js")),
         configuration=dump_toml(run.config).strip() or "none recorded",
         versions=sorted((summary.get("versions") or {}).items()),
@@ -89,11 +90,11 @@ def report_html(
     )
 
 
-def _panels(run: RunData, series: RunSeries, stall_torque: float, figures: Mapping[str, Any]) -> list[Panel]:
+def _panels(run: RunData, series: RunSeries, stall_torque: float, named: Mapping[str, Any]) -> list[Panel]:
     period, plans, level = run.period, extract_plans(run, series), extract_leveling(run, series)
     return [
         plots.footfall(series, period),
-        *(plots_level.level_panels(series, level, figures) if level is not None else []),
+        *(plots_level.level_panels(series, level, named) if level is not None else []),
         plots.attitude(series),
         plots_ground.path(series),
         plots_ground.balance(series),
@@ -106,16 +107,16 @@ def _panels(run: RunData, series: RunSeries, stall_torque: float, figures: Mappi
     ]
 
 
-def _figures(panels: Sequence[Panel], series: RunSeries) -> dict[str, Any]:
+def figures(panels: Sequence[Panel], series: RunSeries) -> dict[str, Any]:
     """Figures for the page's script, with pushes and changes of mode and gait drawn into every time axis."""
     start = plots.replay_start(series) if len(series.time) else 0.0
-    figures: dict[str, Any] = {"start": start, "duration": series.duration}
+    found: dict[str, Any] = {"start": start, "duration": series.duration}
     for panel in panels:
         layout = dict(panel.layout)
         if panel.time:
             layout["shapes"] = [*_marks(series), *layout.get("shapes", [])]
             layout["xaxis"] = {"range": [0.0, series.duration], **layout["xaxis"]}
-        figures[panel.key] = {
+        found[panel.key] = {
             "data": panel.data,
             "layout": layout,
             "time": panel.time,
@@ -124,10 +125,10 @@ def _figures(panels: Sequence[Panel], series: RunSeries) -> dict[str, Any]:
             "full": layout["xaxis"].get("range"),
         }
         if panel.steps:
-            figures[panel.key]["steps"] = [{"time": step.time, "data": step.data} for step in panel.steps]
+            found[panel.key]["steps"] = [{"time": step.time, "data": step.data} for step in panel.steps]
         if panel.follows:
-            figures[panel.key]["follows"] = True
-    return figures
+            found[panel.key]["follows"] = True
+    return found
 
 
 def _marks(series: RunSeries) -> list[dict[str, Any]]:
@@ -201,7 +202,8 @@ def _footer(series: RunSeries, ticks: int) -> str:
     return f"{ticks} ticks. {source} Angles: roll right side down, pitch nose down, yaw left positive."
 
 
-def _plotly_script() -> str:
+def plotly_script() -> str:
+    """The JavaScript of plotly, from the installed package."""
     from plotly.offline import get_plotlyjs  # noqa: PLC0415 - half a second that only a report needs
 
     return str(get_plotlyjs())

@@ -120,6 +120,9 @@ def extract(run: RunData, stall_torque: float) -> RunSeries:
     com = _array([t.com for t in truth], n, 3) if has_truth else nothing
     rates = [t.v[5] for t in truth] if has_truth else [t.estimate.angular_velocity[2] for t in telemetry]
     hot = [t.motor_temperature for t in truth] if has_truth else [f.joint_temperature for f in frames]
+    # A robot that finds its own way commands itself.
+    pairs = zip(run.commands[:n], telemetry, strict=False)
+    wanted = [c.motion if c.motion.guide is None else t.motion for c, t in pairs]
     share = _array([f.joint_load for f in frames], n, 16)
     return RunSeries(
         time=time - start, has_truth=has_truth, q=q,
@@ -128,9 +131,9 @@ def extract(run: RunData, stall_torque: float) -> RunSeries:
         rpy_command=_array([t.motion.trunk.rpy[:2] for t in telemetry], n, 2),
         velocity_estimate=_array([_estimated_velocity(t) for t in telemetry], n, 2),
         velocity_truth=_array([_true_velocity(t) for t in truth], n, 2) if has_truth else nothing[:, :2],
-        velocity_command=_array([c.motion.velocity for c in run.commands[:n]], n, 2),
+        velocity_command=_array([m.velocity for m in wanted], n, 2),
         yaw_rate=_array(rates, n),
-        yaw_rate_command=_array([c.motion.yaw_rate for c in run.commands[:n]], n),
+        yaw_rate_command=_array([m.yaw_rate for m in wanted], n),
         height=q[:, 2].copy(), feet=feet, scheduled=~swing, switch=switch,
         loaded=_array([t.foot_force[:, 2] for t in truth], n, 4) > _LOADED if has_truth else switch,
         com=com, zmp=_measured_zmp(truth, time, com, n), zmp_plan=planned[1], reference=planned[0],

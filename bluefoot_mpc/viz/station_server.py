@@ -30,6 +30,8 @@ _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; "
     "img-src data: blob:; font-src data:; frame-ancestors 'none'"
 )
+_FARTHEST = 1000.0
+"""m; no waypoint is farther from where the run started."""
 _LONGEST = 2000
 """bytes; no message of the page is longer."""
 
@@ -51,6 +53,18 @@ class Console(Protocol):
 
     def order(self, name: str) -> None:
         """Arm, stop and so on."""
+        ...
+
+    def task(self, page: int, name: str) -> None:
+        """The robot is to find its own way: wander, go to the waypoints and so on."""
+        ...
+
+    def waypoint(self, forward: float, left: float) -> None:
+        """One more point to go to, m forward and m to the left of where the run started."""
+        ...
+
+    def clear(self) -> None:
+        """No waypoints any more."""
         ...
 
     def gone(self, page: int) -> None:
@@ -177,16 +191,27 @@ class StateSocket(_Guarded, websocket.WebSocketHandler):
             console.gait(said["gait"])
         if isinstance(said.get("order"), str):
             console.order(said["order"])
+        self._take_way(said)
+
+    def _take_way(self, said: dict[str, Any]) -> None:
+        console = self.shared.console
+        if "waypoint" in said:
+            forward, left = _shares(said["waypoint"], 2, _FARTHEST)
+            console.waypoint(forward, left)
+        if said.get("clear") is True:
+            console.clear()
+        if isinstance(said.get("task"), str):
+            console.task(id(self), said["task"])
 
 
-def _shares(values: Any, count: int) -> list[float]:
-    """Numbers in -1..1.
+def _shares(values: Any, count: int, most: float = 1.0) -> list[float]:
+    """Numbers in -most..most.
 
     Raises:
         ValueError: they are not as many numbers, or not finite.
     """
     shares = [float(value) for value in values]
-    if len(shares) != count or not all(-1.0 <= share <= 1.0 for share in shares):
+    if len(shares) != count or not all(-most <= share <= most for share in shares):
         raise ValueError(values)
     return shares
 

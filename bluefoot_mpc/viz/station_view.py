@@ -44,6 +44,7 @@ def station_page(robot: RobotModel) -> str:
         viewer_script=embed_script(viewer_script()),
         player_script=embed_script(template_text("player.js")),
         instruments_script=embed_script(template_text("station_instruments.js")),
+        map_script=embed_script(template_text("station_map.js")),
         controls_script=embed_script(template_text("station_controls.js")),
         station_script=embed_script(template_text("station.js")),
     )
@@ -91,6 +92,7 @@ class StationView:
             "armed": picture.armed,
             "alarm": picture.alarm,
             "healthy": picture.healthy,
+            "way": _way(picture),
             "texts": _texts(picture),
             "link": _link(quality),
         }
@@ -112,6 +114,19 @@ class StationView:
         places = [self._data.oMf[number].translation for number in self._robot.foot_frame_ids]
         feet: FloatArray = np.array(places, dtype=np.float64) - np.array([0.0, 0.0, self._radius])
         return feet
+
+
+def _way(picture: RobotPicture) -> dict[str, Any]:
+    way = picture.way if picture.task else None
+    marker = picture.way.marker if picture.way is not None else np.full(2, np.nan)
+    return {
+        "task": picture.task,
+        "lead": "" if way is None else way.lead,
+        "why": picture.why if way is not None else "",
+        "clearance": None if way is None else _number(way.clearance),
+        "marker": _numbers(marker),
+        "markerAge": None if way is None else _number(way.marker_age),
+    }
 
 
 def _link(quality: LinkQuality) -> dict[str, Any]:

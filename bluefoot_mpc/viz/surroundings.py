@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from bluefoot_mpc.exceptions import BlueFootError
-from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.settings import build
 from bluefoot_mpc.sim.config import WorldConfig
 from bluefoot_mpc.sim.worlds import footprint
@@ -22,17 +23,17 @@ _CORNERS = 24
 """Corners of the polygon that stands for a circle."""
 
 
-def plan_of(run: RunData) -> WorldPlan | None:
+def plan_of(config: Mapping[str, Any]) -> WorldPlan | None:
     """The plan of the world of a simulated run; None where there is none, or where it cannot be made again.
 
     Args:
-        run: the run; its configuration names world and seed.
+        config: everything resolved, as a run records it: names world and seed.
     """
-    table = run.config.get("sim", {}).get("world")
-    if table is None or run.config.get("run", {}).get("robot") == "hardware":
+    named, table = config.get("run", {}), config.get("sim", {}).get("world")
+    if table is None or named.get("robot") == "hardware":
         return None
     try:
-        return world_plan(build(WorldConfig, table, "sim.world"), int(run.config["run"].get("seed") or 0))
+        return world_plan(build(WorldConfig, table, "sim.world"), int(named.get("seed") or 0))
     except (BlueFootError, OSError) as error:
         # A file that was moved since, or a log of another version: the run can be shown without its world.
         _LOG.warning("the run's world cannot be drawn: %s", error)

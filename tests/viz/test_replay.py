@@ -40,7 +40,7 @@ class FakeView:
         self.url, self.alive, self.pages, self.closed = "http://here/", True, 1, False
         self.times: list[float] = []
 
-    def show(self, telemetry, truth=None) -> None:
+    def show(self, telemetry, truth=None, scan=None) -> None:
         assert telemetry.time == truth.time
         self.times.append(telemetry.time)
 
@@ -51,7 +51,7 @@ class FakeView:
 def test_plays_every_tick_and_closes(log: RunData, monkeypatch: pytest.MonkeyPatch) -> None:
     views: list[FakeView] = []
 
-    def make(robot: object) -> FakeView:
+    def make(robot: object, stage: object) -> FakeView:
         views.append(FakeView(robot))
         return views[-1]
 

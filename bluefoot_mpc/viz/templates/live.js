@@ -38,17 +38,27 @@
   wireControls(root, view, () => draw());
   let state = null, fresh = false;
 
+  // What surrounds the robot; a sweep stays until the next one comes, or for half a second.
+  let swept = 0;
+  function around() {
+    if (state.leader && view.leader) view.leader.place(state.leader, state.turned, state.steered);
+    if (state.sweep) { swept = state.time; view.sweeps.put(state.sweep, view.shown.sweep); }
+    if (state.time - swept > 0.5 || state.time < swept || !view.shown.sweep) view.sweeps.points.visible = false;
+    view.goals.place(state.waypoints || [], state.reached || 0, state.marker || null);
+  }
+
   function draw() {
     if (!state) return;
     const i = recording.count - 1;
     if (view) view.show(recording.time[i]);
     plan.show(recording.time[i]);
+    if (view) around();
     const [roll, pitch] = recording.rollPitch(i), [forward, left, turn] = state.speed;
     const mm = (x) => (1000 * x).toFixed(0).replace("-", "\u2212");
     role("state").textContent = `${state.mode} · roll ${degrees(roll)} · pitch ${degrees(pitch)}`;
     role("clock").textContent = `${state.time.toFixed(1)} s`;
     role("command").textContent = state.mode === "walk"
-      ? `${state.gait}, ${mm(forward)} mm/s forward, ${mm(left)} mm/s left, ${degrees(turn)}/s left turn` : state.mode;
+      ? `${state.guided ? `led by: ${state.guided}${state.reason ? ` (${state.reason})` : ""} · ` : ""}${state.gait}, ${mm(forward)} mm/s forward, ${mm(left)} mm/s left, ${degrees(turn)}/s left turn` : state.mode;
     if (state.events.length) role("event").textContent = state.events[state.events.length - 1];
   }
 
@@ -62,6 +72,7 @@
     socket.onmessage = (message) => {
       const next = JSON.parse(message.data);
       if (state && next.time < state.time) recording.count = 0;  // a new run
+      if (fresh && state && state.sweep && !next.sweep) next.sweep = state.sweep;  // not drawn yet
       state = next;
       recording.add(state);
       fresh = true;

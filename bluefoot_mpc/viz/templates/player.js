@@ -99,17 +99,25 @@ class Clock {
 
 class View3D {
   constructor(pane, recording) {
-    this.pane = pane; this.rec = recording; this.follow = true; this.shown = { support: true, path: true };
+    this.pane = pane; this.rec = recording; this.follow = true; this.shown = { support: true, path: true, sweep: true };
     const viewer = this.viewer = new MeshCat.Viewer(pane);
     viewer.set_3d_pane_size = () => this.resize();
     viewer.gui.domElement.remove();
     for (const command of recording.data.commands) viewer.handle_command(command);
+    for (const command of recording.data.surroundings || []) viewer.handle_command(command);
+    this.room = recording.data.bounds || null;
+    this.far = this.room ? 14 : 5.2;
     this.nodes = recording.data.nodes.map((node) => {
       const object = viewer.scene_tree.find(node.path).object;
       return { object, rest: object.quaternion.clone(), axis: new MeshCat.THREE.Vector3(...node.axis), q: node.q };
     });
     this.dress();
     this.addOverlays();
+    const { leader, sweeps, waypoints } = recording.data;
+    this.leader = leader ? new LeaderView(viewer, leader) : null;
+    this.sweeps = sweeps ? new SweepView(viewer.scene, sweeps, recording) : null;
+    this.goals = sweeps || waypoints ? new GoalView(viewer.scene) : null;
+    if (waypoints) this.goals.place(waypoints, 0, null);
     this.trunk = [0, 0, 0];
     this.preset("corner");
     new ResizeObserver(() => this.resize()).observe(pane);
@@ -130,7 +138,8 @@ class View3D {
     const sun = this.sun = new T.DirectionalLight(0xfff1df, 0.72);
     sun.castShadow = true;
     sun.shadow.mapSize.set(2048, 2048);
-    Object.assign(sun.shadow.camera, { left: -0.45, right: 0.45, top: 0.45, bottom: -0.45, near: 0.2, far: 4 });
+    const half = this.room ? 2 : 0.45;  // m; tall things far away throw shadows too
+    Object.assign(sun.shadow.camera, { left: -half, right: half, top: half, bottom: -half, near: 0.2, far: this.room ? 9 : 4 });
     sun.shadow.bias = -0.0006;
     sun.shadow.radius = 5;
     viewer.scene.add(sun, sun.target);
@@ -163,7 +172,7 @@ class View3D {
     const colour = (name) => css.getPropertyValue(name).trim();
     const sky = new T.Color(colour("--scene"));
     this.viewer.scene.background = sky;
-    this.viewer.scene.fog = new T.Fog(sky, 1.8, 5.2);
+    this.viewer.scene.fog = new T.Fog(sky, this.room ? 6 : 1.8, this.far);
     const context = this.checker.image.getContext("2d");
     context.fillStyle = colour("--floor-a"); context.fillRect(0, 0, 256, 256);
     context.fillStyle = colour("--floor-b"); context.fillRect(0, 0, 128, 128); context.fillRect(128, 128, 128, 128);
@@ -214,7 +223,7 @@ class View3D {
   }
   // Camera and target live in a frame that meshcat turns: world (x, y, z) is local (x, z, -y).
   preset(name) {
-    const offsets = { corner: [0.62, -0.85, 0.42], side: [0.02, -1.15, 0.16], front: [1.15, 0.0, 0.18], top: [-0.01, 0, 1.5] };
+    const offsets = { corner: this.room ? [-1.0, -1.25, 1.55] : [0.62, -0.85, 0.42], side: [0.02, -1.15, 0.16], front: [1.15, 0.0, 0.18], top: [-0.01, 0, 1.5] };
     const [x, y] = this.trunk, z = this.rec.groundHeight(x, y);
     const { camera, controls } = this.viewer;
     if (name === "path") {
@@ -227,7 +236,7 @@ class View3D {
       const [dx, dy, dz] = offsets[name];
       controls.target.set(x, z + 0.06, -y);
       camera.position.set(x + dx, z + 0.06 + dz, -(y + dy));
-      this.viewer.scene.fog.far = 5.2;
+      this.viewer.scene.fog.far = this.far;
     }
     this.follow = name !== "path";
     controls.update();
@@ -235,6 +244,7 @@ class View3D {
   }
   bounds() {
     const rec = this.rec, low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+    if (this.room) return [this.room.slice(0, 2), this.room.slice(2)];
     for (let i = 0; i < rec.count; i++) for (const axis of [0, 1]) {
       low[axis] = Math.min(low[axis], rec.q[rec.width * i + axis]);
       high[axis] = Math.max(high[axis], rec.q[rec.width * i + axis]);
@@ -256,6 +266,8 @@ class View3D {
     this.showGround(i, (leg, k) => mix(rec.feet, 12 * i + 3 * leg + k, 12 * j + 3 * leg + k));
     this.showPush(i, trunk);
     this.extendPath(i);
+    if (this.leader && this.leader.time) this.leader.show(t);
+    if (this.sweeps && this.sweeps.time) this.sweeps.show(t, this.shown.sweep);
     this.move(trunk);
     this.viewer.set_dirty();
   }
@@ -300,7 +312,8 @@ class View3D {
     }
     const z = this.rec.groundHeight(trunk[0], trunk[1]);
     this.sun.target.position.set(trunk[0], trunk[1], z);
-    this.sun.position.set(trunk[0] + 0.5, trunk[1] - 0.55, z + 1.6);
+    const up = this.room ? 2.5 : 1;
+    this.sun.position.set(trunk[0] + 0.5 * up, trunk[1] - 0.55 * up, z + 1.6 * up);
     // The floor moves by whole tiles, so that it seems to be endless and at rest.
     const fx = 0.2 * Math.round(trunk[0] / 0.2), fy = 0.2 * Math.round(trunk[1] / 0.2);
     this.floor.position.set(fx, fy, this.rec.groundHeight(fx, fy));

@@ -31,7 +31,7 @@
   const legs = new LegTable(role("legs"), facts);
   let socket = null, state = null, fresh = false, lastText = 0, closedSince = performance.now();
   const say = (words) => { if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(words)); };
-  const controls = new Controls(root, say);
+  const controls = new Controls(root, say), map = new WayMap(root, say);
 
   const set = (name, text, mood) => {
     const item = role(name);
@@ -45,7 +45,8 @@
     const link = state.link, lost = link.age === null || link.age > 1.5;
     set("link", link.age === null ? "no robot yet" : lost ? `lost for ${link.age.toFixed(0)} s` : "connected", lost ? "bad" : "good");
     const alarm = [6, 8].includes(state.alarm) ? "bad" : state.alarm === 5 ? "warn" : "good";
-    set("mode", state.mode ? `${state.mode}${state.mode === "walk" ? " · " + state.gait : ""}` : "–", lost || !state.mode ? "" : alarm);
+    const doing = state.way.task || state.gait;
+    set("mode", state.mode ? `${state.mode}${state.mode === "walk" ? " · " + doing : ""}` : "–", lost || !state.mode ? "" : alarm);
     set("armed", state.mode ? (state.armed ? "torque on" : "torque off") + (state.state ? ` · ${state.state}` : "") : "–", state.armed && !lost ? "warn" : "");
     set("voltage", state.voltage === null ? "–" : `${state.voltage.toFixed(2)} V`, state.voltage === null ? "" : state.voltage < 10.2 ? "bad" : state.voltage < 10.8 ? "warn" : "");
     const warm = state.temperatures.filter((value) => value !== null), hottest = warm.length ? Math.max(...warm) : null;
@@ -57,6 +58,7 @@
     veil(lost, link.age);
     wanted();
     legs.show(state);
+    map.show(state);
     if (state.rpy[0] !== null) {
       const [roll, pitch, yaw] = state.rpy;
       drawHorizon(role("horizon"), roll, pitch, yaw);
@@ -78,7 +80,7 @@
     const operator = state.operator, [forward, left, turn] = operator.velocity;
     const whole = (value) => value.toFixed(0).replace(/^-0$/, "0").replace("-", "\u2212");
     set("forward", whole(1000 * forward)); set("left", whole(1000 * left)); set("turn", whole(turn * 180 / Math.PI));
-    const bad = ["failed", "denied", "no answer", "unsupported"].includes(operator.result);
+    const bad = !["", "accepted", "replaced"].includes(operator.result);
     set("result", operator.order ? `${operator.order}: ${operator.result || "…"}` : "\u00a0", bad ? "bad" : "");
     for (const button of root.querySelectorAll(".orders [data-order]")) {
       const name = button.dataset.order;
@@ -125,7 +127,7 @@
     socket.onclose = () => { controls.release(); closedSince = performance.now(); setTimeout(connect, 1000); };
   }
 
-  window.station = { controls, get state() { return state; } };
+  window.station = { controls, map, get state() { return state; } };
   frame();
   connect();
 })();
