@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from bluefoot_mpc.navigation import marker_colour, marker_edge
-from bluefoot_mpc.navigation.marker_colour import Blob
-from bluefoot_mpc.navigation.marker_edge import Cone, Lens
+from bluefoot_mpc.navigation.marker_colour import Blob, Circle, Patch
+from bluefoot_mpc.navigation.marker_edge import Cone, Lens, Limits
 from bluefoot_mpc.settings import require_positive, require_range
 from bluefoot_mpc.types import CameraImage
 
+PLAIN = 0.88
+"""Share of the outline on which an edge fits from which on no other circle in the same patch is tried."""
 LEAST_SIDE = 24
 """Pixels: smaller pictures show nothing that could be measured."""
 
@@ -34,7 +37,7 @@ class MarkerConfig:
     least_value: float = 0.10  # 0..1, brightest of red, green and blue
     least_radius: float = 3.5  # pixels of a picture 640 wide: 8 m away for a ball of 0.06 m
     greatest_radius: float = 0.9  # share of the picture's height
-    least_arc_deg: float = 80.0  # degrees of the outline that must be in sight
+    least_arc_deg: float = 95.0  # degrees of the outline that must be in sight
     least_support: float = 0.72  # share of the outline in sight where an edge fits
     least_merged_support: float = 0.62  # the same before something of the marker's colour
     greatest_residual: float = 0.035  # of the radius, mean distance of the edge from the fit
@@ -105,6 +108,7 @@ class MarkerFinder:
             (config.red, config.green, config.blue), config.hue_tolerance_deg,
             config.least_saturation, config.least_value,
         )  # fmt: skip
+        self._nominal = marker_colour.saturation_and_hue((config.red, config.green, config.blue))
         self._reason = "no picture yet"
 
     @property
@@ -145,26 +149,34 @@ class MarkerFinder:
     def _examine(self, pixels: Any, blob: Blob, lens: Lens) -> Cone | None:
         """The ball in one patch of colour, from its contour or else from circles inside."""
         patch = marker_colour.cut(pixels, blob, self._colour)
-        limits = marker_edge.Limits(
-            least_radius=self._least_radius(pixels.shape[1]),
-            greatest_radius=self._config.greatest_radius * pixels.shape[0],
-            least_arc=self._config.least_arc_deg / 360.0,
-            least_support=self._config.least_support,
-            least_merged_support=self._config.least_merged_support,
-            greatest_residual=self._config.greatest_residual,
-            rays=self._config.rays,
-        )
-        circle = marker_colour.contour_circle(patch)
-        if circle is not None:
-            cone = marker_edge.measure(patch, circle, lens, limits)
-            if cone is not None:
-                return cone
+        limits = self._limits(pixels.shape)
         best: Cone | None = None
-        for inside in marker_colour.hough_circles(patch, limits.least_radius, limits.greatest_radius):
-            cone = marker_edge.measure(patch, inside, lens, limits)
+        for circle in self._circles(patch, limits):
+            # What was found in a reduced picture is measured in the full one.
+            close = patch if patch.scale == 1.0 else marker_colour.cut_around(pixels, circle, self._colour)
+            cone = marker_edge.measure(close, circle, lens, limits)
             if cone is not None and (best is None or cone.score > best.score):
                 best = cone
+                if best.support > PLAIN:
+                    break
         return best
+
+    def _circles(self, patch: Patch, limits: Limits) -> Iterator[Circle]:
+        """Circles to try, the likeliest first; costly ones are only worked out where they are asked for."""
+        for mask in (patch.mask, marker_colour.nearest_colour(patch, self._nominal)):
+            circle = None if mask is None else marker_colour.contour_circle(patch, mask)
+            if circle is not None:
+                yield circle
+        yield from marker_colour.hough_circles(patch, limits.least_radius, limits.greatest_radius)
+
+    def _limits(self, shape: tuple[int, ...]) -> Limits:
+        config = self._config
+        return Limits(
+            least_radius=self._least_radius(shape[1]), greatest_radius=config.greatest_radius * shape[0],
+            least_arc=config.least_arc_deg / 360.0, least_support=config.least_support,
+            least_merged_support=config.least_merged_support, greatest_residual=config.greatest_residual,
+            rays=config.rays,
+        )  # fmt: skip
 
 
 def _fault(image: CameraImage | None) -> str:

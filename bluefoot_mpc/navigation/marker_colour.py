@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import colorsys
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +15,14 @@ from bluefoot_mpc.types import FloatArray
 
 HALF = 2
 """Pictures are searched at half size: a quarter of the work, and a ball eight metres away still shows."""
-LARGEST_PATCH = 200
+LARGEST_PATCH = 330
 """Pixels: larger patches are measured in a reduced picture; a large ball has edge enough."""
 LEAST_FILL = 0.25
 """Share of its box that a patch fills at least: less are thin lines and crumbs."""
+LEAST_PARTING = 12.0
+"""Levels of saturation between two colours in one patch."""
+HOUGH_CIRCLES = 3
+"""Circles of Hough's transform that are examined in each channel."""
 TRIPLES = 48
 """Circles that are tried through three points of a contour each."""
 ON_CIRCLE = 0.06
@@ -72,6 +77,7 @@ class Patch:
 
     Attributes:
         pixels: (h, w, 3) red, green, blue.
+        hsv: (h, w, 3) hue, saturation and value.
         mask: (h, w) 255 where the colour is the marker's.
         left: pixels of the whole picture, left edge of the patch.
         upper: pixels of the whole picture, its upper edge.
@@ -81,6 +87,7 @@ class Patch:
     """
 
     pixels: NDArray[np.uint8]
+    hsv: NDArray[np.uint8]
     mask: NDArray[np.uint8]
     left: float
     upper: float
@@ -89,11 +96,16 @@ class Patch:
     height: int
 
 
-def colour_mask(pixels: Any, colour: ColourRange) -> Any:
-    """(h, w) 255 where (h, w, 3) `pixels` have the colour, else 0."""
+def saturation_and_hue(colour: tuple[float, float, float]) -> tuple[int, int]:
+    """Of a colour (red, green, blue, 0..1), as OpenCV counts them: 0..255 and 0..179."""
+    hue, saturation, _ = colorsys.rgb_to_hsv(*colour)
+    return round(255.0 * saturation), round(180.0 * hue) % 180
+
+
+def colour_mask(hsv: Any, colour: ColourRange) -> Any:
+    """(h, w) 255 where the pixels (h, w, 3), hue, saturation, value, have the colour, else 0."""
     import cv2  # noqa: PLC0415
 
-    hsv = cv2.cvtColor(pixels, cv2.COLOR_RGB2HSV)
     masks = [cv2.inRange(hsv, np.array(low), np.array(high)) for low, high in colour.bounds]
     return masks[0] if len(masks) == 1 else cv2.bitwise_or(masks[0], masks[1])
 
@@ -104,7 +116,7 @@ def blobs(pixels: Any, colour: ColourRange, count: int, least_radius: float) -> 
 
     height, width = pixels.shape[:2]
     small = cv2.resize(pixels, (width // HALF, height // HALF), interpolation=cv2.INTER_AREA)
-    mask = colour_mask(small, colour)
+    mask = colour_mask(cv2.cvtColor(small, cv2.COLOR_RGB2HSV), colour)
     if not cv2.countNonZero(mask):
         return []
     _, _, stats, _ = cv2.connectedComponentsWithStats(mask)
@@ -127,8 +139,11 @@ def cut(pixels: Any, blob: Blob, colour: ColourRange) -> Patch:
 
     height, width = pixels.shape[:2]
     margin = 6 + (max(blob.right - blob.left, blob.lower - blob.upper) // 4)
-    left, upper = max(0, blob.left - margin), max(0, blob.upper - margin)
-    right, lower = min(width, blob.right + margin), min(height, blob.lower + margin)
+    left, upper = max(0, min(blob.left - margin, width - 2)), max(0, min(blob.upper - margin, height - 2))
+    right, lower = (
+        max(left + 2, min(width, blob.right + margin)),
+        max(upper + 2, min(height, blob.lower + margin)),
+    )
     view = pixels[upper:lower, left:right]
     scale = max(1, math.ceil(max(right - left, lower - upper) / LARGEST_PATCH))
     if scale > 1:
@@ -138,19 +153,30 @@ def cut(pixels: Any, blob: Blob, colour: ColourRange) -> Patch:
             view[: rows * scale, : columns * scale], (columns, rows), interpolation=cv2.INTER_AREA
         )
     view = np.ascontiguousarray(view)
+    hsv: Any = cv2.cvtColor(view, cv2.COLOR_RGB2HSV)
     return Patch(
-        pixels=view, mask=colour_mask(view, colour), left=float(left), upper=float(upper),
+        pixels=view, hsv=hsv, mask=colour_mask(hsv, colour), left=float(left), upper=float(upper),
         scale=float(scale), width=width, height=height,
     )  # fmt: skip
 
 
-def contour_circle(patch: Patch) -> Circle | None:
-    """The circle on which most of the patch's contour lies; None where there is none.
+def cut_around(pixels: Any, circle: Circle, colour: ColourRange) -> Patch:
+    """The picture around a circle, with a margin."""
+    column, row, radius = circle
+    box = Blob(
+        left=math.floor(column - radius), upper=math.floor(row - radius),
+        right=math.ceil(column + radius), lower=math.ceil(row + radius),
+    )  # fmt: skip
+    return cut(pixels, box, colour)
+
+
+def contour_circle(patch: Patch, mask: NDArray[np.uint8]) -> Circle | None:
+    """The circle on which most of a mask's contour lies; None where there is none.
 
     What an obstacle or the picture's edge cuts off may miss. Circles through three points each are tried and
     scored by the contour's length on them.
     """
-    points = _contour(patch)
+    points = _contour(patch, mask)
     if len(points) < 8:
         return None
     circles = _circles_through(points)
@@ -170,41 +196,64 @@ def contour_circle(patch: Patch) -> Circle | None:
     ) if math.isfinite(radius) else None  # fmt: skip
 
 
-def hough_circles(patch: Patch, least: float, greatest: float) -> list[Circle]:
+def nearest_colour(patch: Patch, nominal: tuple[int, int]) -> NDArray[np.uint8] | None:
+    """(h, w) 255 where a mask of two colours has the one nearer to the marker's; None where it has one.
+
+    Otsu's threshold of the distance in saturation and hue parts a ball from a wall that is a little paler:
+    shading changes neither.
+
+    Args:
+        patch: the picture.
+        nominal: saturation and hue of the marker, as OpenCV counts them.
+    """
+    import cv2  # noqa: PLC0415
+
+    hsv: Any = cv2.GaussianBlur(patch.hsv, (3, 3), 0.8)
+    levels = np.arange(256)
+    saturation = cv2.LUT(hsv[:, :, 1], np.abs(levels - nominal[0]).astype(np.uint8))
+    hue = cv2.LUT(hsv[:, :, 0], np.minimum(3 * np.abs(levels - nominal[1]), 120).astype(np.uint8))
+    distance = cv2.add(saturation, hue)
+    values = distance[patch.mask > 0].reshape(-1, 1)
+    if len(values) < 20:
+        return None
+    level, _ = cv2.threshold(values, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
+    low, high = values[values <= level], values[values > level]
+    if not len(low) or not len(high) or float(high.mean()) - float(low.mean()) < LEAST_PARTING:
+        return None
+    return np.where(distance <= level, patch.mask, np.uint8(0))
+
+
+def hough_circles(patch: Patch, least: float, greatest: float) -> Iterator[Circle]:
     """Circles inside a patch by Hough's transform, best first: for a ball before a wall of its colour.
 
-    Brightness and saturation are searched both: the wall may differ from the ball in either.
+    Saturation, brightness and hue are searched one after the other: the wall may differ from the ball in any.
     """
     import cv2  # noqa: PLC0415
 
     low = max(3, math.floor(least / patch.scale))
     high = min(math.ceil(greatest / patch.scale), max(patch.mask.shape))
     if high <= low:
-        return []
-    found: list[Circle] = []
-    hsv = cv2.cvtColor(patch.pixels, cv2.COLOR_RGB2HSV)
-    for channel in (hsv[:, :, 2], hsv[:, :, 1], hsv[:, :, 0]):
-        smooth = cv2.GaussianBlur(channel, (5, 5), 1.2)
+        return
+    for channel in (1, 2, 0):
+        smooth = cv2.GaussianBlur(patch.hsv[:, :, channel], (5, 5), 1.2)
         circles = cv2.HoughCircles(
             smooth, cv2.HOUGH_GRADIENT, dp=1.0, minDist=max(6.0, 0.5 * low), param1=24.0, param2=11.0,
             minRadius=low, maxRadius=high,
         )  # fmt: skip
-        if circles is not None:
-            for column, row, radius in np.asarray(circles).reshape(-1, 3)[:3].tolist():
-                found.append(
-                    (
-                        patch.left + patch.scale * (column + 0.5), patch.upper + patch.scale * (row + 0.5),
-                        patch.scale * radius,
-                    )
-                )  # fmt: skip
-    return found
+        if circles is None:
+            continue
+        for column, row, radius in np.asarray(circles).reshape(-1, 3)[:HOUGH_CIRCLES].tolist():
+            yield (
+                patch.left + patch.scale * (column + 0.5), patch.upper + patch.scale * (row + 0.5),
+                patch.scale * radius,
+            )  # fmt: skip
 
 
-def _contour(patch: Patch) -> FloatArray:
+def _contour(patch: Patch, mask: NDArray[np.uint8]) -> FloatArray:
     """(n, 2) column, row in the patch of its largest contour: at most 120, none on the picture's edge."""
     import cv2  # noqa: PLC0415
 
-    contours, _ = cv2.findContours(patch.mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
         return np.zeros((0, 2))
     # By their boxes: a thin rest beside the ball may be long but is not large.
