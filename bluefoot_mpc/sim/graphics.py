@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import importlib
 import os
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -24,6 +25,7 @@ MEND = (
 )
 """Way out where nothing can draw."""
 
+_PLATFORM = "PYOPENGL_PLATFORM"
 _EGL_NAMES, _OSMESA_NAMES = ("libEGL.so.1", "libEGL.so"), ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")
 _PLATFORM_DEVICE = 0x313F  # EGL_EXT_platform_device
 _MOST_DEVICES = 16
@@ -40,6 +42,9 @@ def graphics_context(width: int, height: int) -> Any:
         ConfigurationError: nothing here can draw, or what MUJOCO_GL chooses cannot.
     """
     name = chosen_library()
+    if "OpenGL" not in sys.modules:
+        # A parent process may have left its own choice here, which PyOpenGL would follow.
+        os.environ[_PLATFORM] = name
     try:
         context = importlib.import_module(f"mujoco.{name}").GLContext(width, height)
         context.make_current()

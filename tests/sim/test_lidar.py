@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.io.lidar.geometry import FIRST_STEP, FRONT_STEP, POINTS, bearings
+from bluefoot_mpc.io.lidar.geometry import (
+    FIRST_STEP,
+    FRONT_STEP,
+    GREATEST_RANGE,
+    LEAST_RANGE,
+    POINTS,
+    bearings,
+)
 from bluefoot_mpc.model.robot import load_robot
 from bluefoot_mpc.sim.config import SimConfig, WorldConfig
+from bluefoot_mpc.sim.leader_config import LeaderConfig
 from bluefoot_mpc.sim.lidar import NO_ECHO, RaycastLidar
 from bluefoot_mpc.sim.randomization import draw
 from bluefoot_mpc.sim.sight_config import LidarConfig
@@ -77,6 +85,53 @@ def test_the_scan_turns_and_moves_with_the_robot(world, robot):
     assert scan[FRONT - QUARTER] == 1500
 
 
+@pytest.mark.parametrize("pitch", [0.12, 0.2, 0.3])
+def test_a_nose_down_trunk_looks_at_the_floor(world, robot, pitch):
+    place(world)
+    data, mount = world.data, np.array(robot.parameters.sensors.lidar)
+    data.qpos[world.q + 3 : world.q + 7] = (math.cos(pitch / 2), 0, math.sin(pitch / 2), 0)
+    mujoco.mj_kinematics(world.model, data)
+    sensor = lidar(world, robot, PERFECT)
+    seen = sensor.look(bearings())
+    # Nose down, a lens ahead of the centre comes down, too.
+    height = 0.25 + mount[2] * math.cos(pitch) - mount[0] * math.sin(pitch)
+    ahead = mount[0] * math.cos(pitch) + mount[2] * math.sin(pitch)
+    to_floor, to_wall = height / math.sin(pitch), (2.0 - ahead) / math.cos(pitch)
+    assert to_floor < to_wall or pitch == 0.12
+    assert seen[FRONT] == pytest.approx(min(to_floor, to_wall), abs=1e-9)
+    # Sideways the plane is level: the wall on the left is where it was.
+    assert seen[FRONT + QUARTER] == pytest.approx(1.0, abs=1e-9)
+    # A ray at a bearing b drops by sin(pitch) cos(b).
+    slanted = FRONT + 60
+    drop = math.sin(pitch) * math.cos(bearings()[slanted])
+    if height / drop < 1.0 / math.sin(bearings()[slanted]) and pitch > 0.12:
+        assert seen[slanted] == pytest.approx(height / drop, abs=1e-9)
+
+
+def test_a_leader_is_seen(robot):
+    config = SimConfig(leader=LeaderConfig(kind="differential", distance=0.9))
+    world = build_world(robot, config, draw(config, 0))
+    data = world.data
+    data.qpos[world.q : world.q + 7] = (0, 0, 0.12, 1, 0, 0, 0)
+    mujoco.mj_kinematics(world.model, data)
+    seen = lidar(world, robot, PERFECT).look(bearings())
+    hits = np.flatnonzero(~np.isnan(seen))
+    assert hits.size > 3, "nothing but the leader stands on the floor"
+    body = world.model.geom_bodyid[lidar_geoms(world, robot, hits)]
+    assert {world.model.body_rootid[b] for b in body}.isdisjoint({0, world.model.body_rootid[world.trunk]})
+    place_of_leader = data.geom_xpos[world.model.geom("marker").id]
+    angle = bearings()[hits]
+    points = np.array([0.04, 0.0]) + seen[hits, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    assert (np.hypot(*(points - place_of_leader[:2]).T) < 0.25).all()
+
+
+def lidar_geoms(world, robot, hits):
+    """Geoms that these rays of a level LIDAR meet."""
+    sensor = lidar(world, robot, PERFECT)
+    sensor.look(bearings())
+    return sensor._geom[hits]
+
+
 def a_leg_is_in_the_way(world, robot):
     """Whether a ray of the scan meets the robot where every group is looked at."""
     data, geom, distance = world.data, np.zeros(POINTS, dtype=np.int32), np.zeros(POINTS)
@@ -124,6 +179,16 @@ def test_jitter_turns_the_rays(world, robot):
     angle = bearings()[slanted]
     slope = scans.mean() * math.tan(angle)
     assert scans.std() == pytest.approx(slope * math.radians(0.5), rel=0.2)
+
+
+def test_a_scan_is_what_the_driver_would_make_of_the_sensors_bytes(world, robot):
+    place(world)
+    raw, scan = lidar(world, robot, seed=3).scan(0.0), lidar(world, robot, seed=3).measure(0.25)
+    assert scan.time == 0.25
+    outside = (raw < LEAST_RANGE) | (raw > GREATEST_RANGE)
+    np.testing.assert_array_equal(scan.distance, np.where(outside, np.nan, raw * 0.001))
+    assert outside.any()
+    assert scan.bearing is lidar(world, robot).measure(0.0).bearing
 
 
 def test_the_seed_decides_and_reset_begins_anew(world, robot):
