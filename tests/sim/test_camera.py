@@ -116,6 +116,9 @@ def test_the_robot_is_not_in_its_own_pictures(world, robot, lens):
     world.data.qpos[world.q + 7 : world.q + 23] = np.tile([0.0, 1.5, 0.0, 0.0], 4)
     mujoco.mj_kinematics(world.model, world.data)
     np.testing.assert_array_equal(lens.look(), free)
+    lens._option.geomgroup[3] = 1
+    assert (lens.look() != free).any(), "no leg is in the way: the test shows nothing"
+    lens._option.geomgroup[3] = 0
     world.data.qpos[world.q + 7 : world.q + 23] = 0.0
 
 
