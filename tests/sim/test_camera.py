@@ -112,8 +112,8 @@ def test_a_ball_is_as_large_as_it_should_be(world, robot, lens):
 def test_the_robot_is_not_in_its_own_pictures(world, robot, lens):
     place(world)
     free = lens.look().copy()
-    # Front legs straight up before the lens.
-    world.data.qpos[world.q + 7 : world.q + 23] = np.tile([0.0, 1.5, 0.0, 0.0], 4)
+    # The left front leg turned in before the lens.
+    world.data.qpos[world.q + 7 : world.q + 23] = np.tile([-1.0, 0.0, 1.2, 0.0], 4)
     mujoco.mj_kinematics(world.model, world.data)
     np.testing.assert_array_equal(lens.look(), free)
     lens._option.geomgroup[3] = 1
