@@ -10,8 +10,8 @@ from bluefoot_mpc.wheels.drive import DriveLimits, DriveState, WheelDrive
 from bluefoot_mpc.wheels.kinematics import Motion, WheelCommand, forward, inverse
 from bluefoot_mpc.wheels.mobility import (
     Icr,
-    delta_m,
     delta_M,
+    delta_m,
     delta_s,
     holonomic,
     icr,

@@ -68,7 +68,7 @@ class BalancingDrive:
         self._reference = np.zeros(4)  # path m, speed m/s, heading rad, yaw rate rad/s
         self._torques = np.zeros(2)  # N·m: sum, and right less left
         self._until_control = 0.0
-        self.state = self._state(np.zeros(2), fallen=False)
+        self.state = self._state(np.zeros(2), np.zeros(2), fallen=False)
 
     @property
     def estimate(self) -> FloatArray:
@@ -81,7 +81,8 @@ class BalancingDrive:
         coupling = body.body_mass * body.body_height * math.cos(tilt)
         mass = [[body.rolling_mass, coupling], [coupling, body.tilting_inertia]]
         lever = body.body_height * math.cos(tilt)
-        self.body_state[[1, 3]] += np.linalg.solve(mass, [impulse, impulse * lever])
+        change = np.linalg.solve(mass, [impulse, impulse * lever])
+        self.body_state = self.body_state + np.array([0.0, change[0], 0.0, change[1]])
 
     def step(self, wanted: FloatArray, dt: float) -> DriveState:
         """Balance for `dt` (s) on the way to a wanted twist.
@@ -108,24 +109,22 @@ class BalancingDrive:
             left -= step
             self._until_control -= step
             if abs(self.body_state[2]) > self.config.fall_angle:
-                self.body_state[[1, 3]] = 0.0
+                self.body_state = self.body_state * np.array([1.0, 0.0, 1.0, 0.0])
                 self._yaw[1] = 0.0
-                self.state = self._state(self._moved(before), fallen=True)
+                self.state = self._state(self.state.wheel_angle, self._moved(before), fallen=True)
                 return self.state
-        self.state = self._state(self._moved(before), fallen=False)
+        self.state = self._state(self.state.wheel_angle, self._moved(before), fallen=False)
         return self.state
 
     def _moved(self, before: FloatArray) -> FloatArray:
         return np.array([self.body_state[0], self._yaw[0]]) - before
 
-    def _state(self, moved: FloatArray, *, fallen: bool) -> DriveState:
+    def _state(self, turned: FloatArray, moved: FloatArray, *, fallen: bool) -> DriveState:
         speed, rate = float(self.body_state[1]), float(self._yaw[1])
-        turned = self._wheels(*moved.tolist())
-        angle = turned if not hasattr(self, "state") else self.state.wheel_angle + turned
         return DriveState(
             twist=np.array([speed, 0.0, rate]),
             wheel_speed=self._wheels(speed, rate),
-            wheel_angle=angle,
+            wheel_angle=turned + self._wheels(*moved.tolist()),
             steering=np.zeros(2),
             tilt=float(self.body_state[2]),
             fallen=fallen,
@@ -137,13 +136,8 @@ class BalancingDrive:
         return np.array([ahead - across, ahead + across]) / self.config.body.wheel_radius
 
     def _advance(self, dt: float) -> None:
-        """Body and yaw by one step of physics (Runge and Kutta's of order 4; yaw exactly)."""
-        body, x, torque = self.config.body, self.body_state, float(self._torques[0])
-        k1 = body.derivative(x, torque)
-        k2 = body.derivative(x + 0.5 * dt * k1, torque)
-        k3 = body.derivative(x + 0.5 * dt * k2, torque)
-        k4 = body.derivative(x + dt * k3, torque)
-        self.body_state = x + dt / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+        """Body and yaw by one step of physics."""
+        self.body_state = self.config.body.advanced(self.body_state, float(self._torques[0]), dt)
         heading, rate = self._yaw.tolist()
         push = self._yaw_effort * float(self._torques[1])
         decay = math.exp(-self._yaw_damping * dt)

@@ -42,7 +42,7 @@ class Gait:
     def __post_init__(self) -> None:
         if not self.legs or len(self.legs) != len(self.landing):
             raise ConfigurationError(
-                f"gait '{self.name}': {len(self.legs)} legs, and {len(self.landing)} landings: one for each wanted"
+                f"gait '{self.name}': {len(self.legs)} legs need as many landings, not {len(self.landing)}"
             )
         require_range(1e-6, 1.0, duty=self.duty)
         for moment in self.landing:

@@ -74,6 +74,27 @@ class WheeledPendulum:
         push, turn = self.accelerations(speed, tilt, rate, torque)
         return np.array([speed, push, rate, turn])
 
+    def advanced(self, state: FloatArray, torque: float, dt: float) -> FloatArray:
+        """(4,) state after `dt` (s) with the torque held (one step of Runge and Kutta's order 4)."""
+        x, v, tilt, rate = state.tolist()  # plain floats: three times faster than small arrays
+        half = 0.5 * dt
+        a1, b1 = self.accelerations(v, tilt, rate, torque)
+        v2, rate2 = v + half * a1, rate + half * b1
+        a2, b2 = self.accelerations(v2, tilt + half * rate, rate2, torque)
+        v3, rate3 = v + half * a2, rate + half * b2
+        a3, b3 = self.accelerations(v3, tilt + half * rate2, rate3, torque)
+        v4, rate4 = v + dt * a3, rate + dt * b3
+        a4, b4 = self.accelerations(v4, tilt + dt * rate3, rate4, torque)
+        sixth = dt / 6.0
+        return np.array(
+            [
+                x + sixth * (v + 2.0 * (v2 + v3) + v4),
+                v + sixth * (a1 + 2.0 * (a2 + a3) + a4),
+                tilt + sixth * (rate + 2.0 * (rate2 + rate3) + rate4),
+                rate + sixth * (b1 + 2.0 * (b2 + b3) + b4),
+            ]
+        )
+
     def linear(self) -> tuple[FloatArray, FloatArray]:
         """(4, 4) and (4, 1) matrices of the linear model at rest, upright."""
         moment, r = self.body_mass * self.body_height, self.wheel_radius
