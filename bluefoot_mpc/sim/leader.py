@@ -25,14 +25,14 @@ from bluefoot_mpc.sim.leader_tracking import Manner, Tracker
 from bluefoot_mpc.sim.randomization import stream
 from bluefoot_mpc.types import FloatArray, TruthSample
 from bluefoot_mpc.wheels.balance import BalancingDrive
-from bluefoot_mpc.wheels.drive import WheelDrive
+from bluefoot_mpc.wheels.drive import DriveState, WheelDrive
 from bluefoot_mpc.wheels.mobility import delta_M, delta_m
 from bluefoot_mpc.wheels.ready import READY
 from bluefoot_mpc.wheels.robot import WheeledRobot
 
 __all__ = ["Leader", "LeaderConfig", "add_leader"]
 
-_PERIOD = 0.020
+_PERIOD = 0.040
 """s between two decisions of the leader; its motors push in between too."""
 _RESPONSE = 0.010
 """s, time constant with which the chassis takes on the motion that the wheels give it."""
@@ -85,14 +85,18 @@ class Leader:
         self._place, self._speed = data.qpos[q : q + 3], data.qvel[v : v + 3]
         self._force = data.qfrc_applied[v : v + 3]
         self._every = max(1, round(_PERIOD / period))
-        self._drive = _drive(self.robot, seed)
         self._tracker = Tracker(_way(config.leader), _manner(self.robot))
         self.reset()
+
+    @property
+    def state(self) -> DriveState:
+        """What the wheels do."""
+        return self._drive.state
 
     def reset(self) -> None:
         """Be as after construction: at rest, waiting for `start`. MuJoCo's state is the caller's to reset."""
         self._random = stream(self._seed, "leader")
-        self._drive.reset()
+        self._drive = _drive(self.robot, self._seed)
         self._tracker.reset()
         self._slip = np.zeros(3)
         self._twist = (0.0, 0.0, 0.0)
