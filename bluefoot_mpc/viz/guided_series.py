@@ -106,7 +106,7 @@ class GuidedSeries:
     @property
     def looks_for_a_marker(self) -> bool:
         """True where a marker was wanted, or seen."""
-        return bool(np.isfinite(self.distance_wanted).any() or self.in_view.any())
+        return bool((np.isfinite(self.distance_wanted[self.reports])).any() or self.in_view.any())
 
 
 def extract_guided(run: RunData, series: RunSeries, mounts: SensorMounts) -> GuidedSeries | None:

@@ -210,6 +210,8 @@ def _shares(values: Any, count: int, most: float = 1.0) -> list[float]:
     Raises:
         ValueError: they are not as many numbers, or not finite.
     """
+    if not isinstance(values, list):
+        raise ValueError(values)
     shares = [float(value) for value in values]
     if len(shares) != count or not all(-most <= share <= most for share in shares):
         raise ValueError(values)

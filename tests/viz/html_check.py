@@ -29,7 +29,8 @@ class PageReader(HTMLParser):
         if values.get("http-equiv") == "Content-Security-Policy":
             self.policy = str(values["content"])
         for key in ("src", "href", "srcset", "action", "data", "poster"):
-            if values.get(key):
+            # Pictures inside the page load nothing.
+            if values.get(key) and not str(values[key]).startswith("data:image/"):
                 self.references.append(str(values[key]))
         self._script = str(values.get("id") or "") if tag == "script" else ""
 

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import socket
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from bluefoot_mpc.cli.teleop import Teleop
 from bluefoot_mpc.io.station.ground import GroundLink
 from bluefoot_mpc.io.station.link import StationLink
 from bluefoot_mpc.model.robot import load_robot
-from bluefoot_mpc.types import Mode
+from bluefoot_mpc.types import Guided, GuideTask, Mode, NavigationReport
 from bluefoot_mpc.viz.station_server import StationServer
 from bluefoot_mpc.viz.station_view import StationView, station_page
 
@@ -33,18 +34,32 @@ def free_port():
         return probe.getsockname()[1]
 
 
+def way(guide):
+    """How a robot finds its way that has no waypoint behind it yet."""
+    if guide is None:
+        return None
+    return NavigationReport(
+        guided=Guided.WAYPOINT if guide.task is GuideTask.GOTO else Guided.FIELD, velocity=np.zeros(2),
+        yaw_rate=0.0, pitch=0.0, field=np.zeros(2), potential=0.0, mixing=0.0, marker=np.full(3, np.nan),
+        marker_position=np.full(3, np.nan), marker_age=np.inf, clearance=0.31,
+        waypoints_left=len(guide.waypoints), reason="a wall",
+    )  # fmt: skip
+
+
 async def publish(link):
-    """A robot that rolls from side to side, 50 times a second."""
+    """A robot that rolls from side to side, 50 times a second, and does what it is asked at once."""
     start = time.monotonic()
     while True:
         now = time.monotonic() - start
+        wanted = motion(link)
         told = snapshot(
             now,
-            mode=Mode.STAND,
+            mode=wanted.mode,
             rpy=np.array([0.1 * np.sin(3.0 * now), 0.02, 0.5]),
             voltage=11.0 + 0.01 * now,
         )
-        link.publish(told.telemetry, told.frame, "active")
+        telemetry = replace(told.telemetry, motion=wanted, navigation=way(wanted.guide))
+        link.publish(telemetry, told.frame, "active")
         await asyncio.sleep(0.02)
 
 
@@ -186,6 +201,62 @@ def test_a_page_that_is_gone_lets_go_of_the_robot(ending):
             await until(lambda: not motion(robot).velocity.any(), 2.0)
 
     asyncio.run(leave())
+
+
+async def click_map(browser, forward, left):
+    """Click on the map at a place, m; gives where that is on the screen."""
+    x, y = await browser.value(
+        f"(() => {{ const box = document.querySelector('[data-role=\"map\"]').getBoundingClientRect();"
+        f" const [x, y] = station.map.pixel({forward}, {left}); return [box.x + x, box.y + y]; }})()"
+    )
+    await browser.mouse("mousePressed", x, y)
+    await browser.mouse("mouseReleased", x, y)
+
+
+def test_waypoints_clicked_on_the_map_become_the_robots_way():
+    async def go():
+        async with whole_station() as (browser, robot, _):
+            assert await browser.value("document.querySelector('[data-task=\"goto\"]').disabled")
+            for count, place in enumerate([(1.0, 0.5), (1.5, -0.5)], start=1):
+                await click_map(browser, *place)
+                await browser.wait_for(f"station.state.operator.waypoints.length === {count}")
+            await browser.click('[data-task="goto"]')
+            await until(lambda: motion(robot).guide is not None)
+            guide = motion(robot).guide
+            assert (motion(robot).mode, guide.task) == (Mode.WALK, GuideTask.GOTO)
+            assert guide.waypoints == pytest.approx(np.array([[1.0, 0.5], [1.5, -0.5]]), abs=0.03)
+            await browser.wait_for(f"{text('way')}.includes('waypoint: a wall')")
+            assert "0.31 m clear" in await browser.value(text("way"))
+            assert (await browser.value(text("mode"))) == "walk · goto"
+            # A hand on the keys has priority, at once.
+            await browser.key("keyDown", "w", 87)
+            await until(lambda: motion(robot).velocity[0] > 0.03)
+            assert motion(robot).guide is None
+            await browser.key("keyUp", "w", 87)
+            await until(lambda: motion(robot).mode is Mode.STAND)
+            await browser.click('[data-role="clear"]')
+            await browser.wait_for("station.state.operator.waypoints.length === 0")
+            assert browser.complaints == []
+
+    asyncio.run(go())
+
+
+def test_wandering_begins_and_ends_with_its_button_and_with_the_page():
+    async def wander():
+        async with whole_station() as (browser, robot, server):
+            for ending in ("button", "page"):
+                await browser.click('[data-task="wander"]')
+                await until(lambda: motion(robot).guide is not None)
+                await browser.wait_for("station.state.way.task === 'wander'")
+                if ending == "button":
+                    await browser.click('[data-task="wander"]')
+                else:
+                    for page in tuple(server.shared.pages):
+                        page.close()
+                await until(lambda: motion(robot).mode is Mode.STAND)
+                assert motion(robot).guide is None
+
+    asyncio.run(wander())
 
 
 def test_a_robot_that_falls_silent_is_seen():

@@ -28,6 +28,15 @@ class Console:
     def order(self, name):
         self.said.append(("order", name))
 
+    def task(self, page, name):
+        self.said.append(("task", name))
+
+    def waypoint(self, forward, left):
+        self.said.append(("waypoint", (forward, left)))
+
+    def clear(self):
+        self.said.append(("clear",))
+
     def gone(self, page):
         self.said.append(("gone",))
 
@@ -79,7 +88,8 @@ def test_pages_say_what_they_want_and_see_the_robot():
     async def talk(server):
         page = await connect(server)
         for words in (
-            {"sticks": [0.5, 0, -1]}, {"trunk": [0, 0.1, 0, 0]}, {"gait": "walk"}, {"order": "stop"}
+            {"sticks": [0.5, 0, -1]}, {"trunk": [0, 0.1, 0, 0]}, {"gait": "walk"}, {"order": "stop"},
+            {"waypoint": [1.5, -2]}, {"task": "goto"}, {"clear": True},
         ):  # fmt: skip
             await page.write_message(json.dumps(words))
         await asyncio.sleep(0.05)
@@ -93,7 +103,7 @@ def test_pages_say_what_they_want_and_see_the_robot():
     said = with_server(talk)
     assert said == [
         ("sticks", (0.5, 0.0, -1.0)), ("trunk", (0.0, 0.1, 0.0, 0.0)), ("gait", "walk"), ("order", "stop"),
-        ("gone",),
+        ("waypoint", (1.5, -2.0)), ("task", "goto"), ("clear",), ("gone",),
     ]  # fmt: skip
 
 
@@ -102,6 +112,8 @@ def test_pages_say_what_they_want_and_see_the_robot():
     [
         "no JSON", "[]", "{}", '{"sticks": [1, 2, 3]}', '{"sticks": [0, 0]}', '{"sticks": "abc"}',
         '{"sticks": [NaN, 0, 0]}', '{"sticks": null}', '{"order": 7}', '{"trunk": [0, 0, 0, {}]}',
+        '{"waypoint": [1]}', '{"waypoint": [NaN, 0]}', '{"waypoint": [2000, 0]}', '{"waypoint": "12"}',
+        '{"waypoint": 3}', '{"task": 1}', '{"clear": 1}', '{"clear": "yes"}',
     ],
 )  # fmt: skip
 def test_words_that_mean_nothing_do_nothing(words):
