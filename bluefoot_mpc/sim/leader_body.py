@@ -163,19 +163,12 @@ def add_leader(spec: mujoco.MjSpec, config: LeaderConfig, visuals: bool = False)
     for name, (kind, axis) in zip(JOINTS, axes, strict=True):
         leader.add_joint(name=name, type=kind, axis=axis)
     _add_frame(leader, config.kind, tilts_at=robot.wheels[0].radius)
-    _keep(spec, FRAME)
     for index, wheel in enumerate(robot.wheels):
         x, y = wheel.position.tolist()
         body = leader.add_body(
             name=wheel_body(index), pos=[x, y, wheel.radius], quat=wheel_quaternion(wheel, 0.0, 0.0)
         )
         _add_wheel(body, wheel, visuals)
-        _keep(spec, body.name)
-
-
-def _keep(spec: mujoco.MjSpec, name: str) -> None:
-    """Keep the compiler from fusing a body with the leader, as it does in models made of a URDF."""
-    spec.add_exclude(bodyname1=LEADER, bodyname2=name)
 
 
 def _add_frame(leader: mujoco.MjsBody, kind: str, tilts_at: float) -> None:

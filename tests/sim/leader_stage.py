@@ -24,8 +24,6 @@ class Stage:
     ) -> None:
         self.config = LeaderConfig(**{"delay": 0.0, **leader})
         spec = mujoco.MjSpec()
-        # As in models made of a URDF, where bodies without joints are fused with others.
-        spec.compiler.fusestatic = True
         spec.option.timestep = PERIOD
         spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05])
         if wall_at is not None:
