@@ -1,4 +1,4 @@
-"""Out of a corner: who should move and does not turns in place, backs off, steps aside, in turn."""
+"""Out of a corner: who should move and does not makes room, turns, backs off and steps aside, in turn."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ class EscapeConfig:
     patience: float = 4.0  # s without motion
     distance: float = 0.05  # m, that count as motion
     turn_deg: float = 10.0  # degrees, that do
+    away_time: float = 2.0  # s of making room
     turn_time: float = 3.0  # s of turning in place
     back_time: float = 2.5  # s of backing off
     side_time: float = 2.0  # s of stepping aside
@@ -30,7 +31,7 @@ class EscapeConfig:
 
     def __post_init__(self) -> None:
         require_positive(
-            patience=self.patience, distance=self.distance, turn_deg=self.turn_deg,
+            patience=self.patience, distance=self.distance, turn_deg=self.turn_deg, away_time=self.away_time,
             turn_time=self.turn_time, back_time=self.back_time, side_time=self.side_time,
             yaw_rate=self.yaw_rate, back_speed=self.back_speed, side_speed=self.side_speed,
             enough_deg=self.enough_deg, enough=self.enough,
@@ -93,12 +94,13 @@ class Escape:
         self._start, self._since = pose, time
         self._side = 1.0 if openness >= 0.0 else -1.0
 
-    def step(self, pose: Pose, time: float) -> Motion:
+    def step(self, pose: Pose, time: float, away: Motion) -> Motion:
         """What to do now; ends itself once the robot has come away.
 
         Args:
             pose: of the robot.
             time: s.
+            away: the motion that makes most room.
         """
         config, start = self._config, self._start
         if start is None:
@@ -108,15 +110,22 @@ class Escape:
         if turned > math.radians(config.enough_deg) or away > config.enough:
             self._start = None
             return Motion()
-        cycle = config.turn_time + config.back_time + config.turn_time + config.side_time
-        rounds, phase = divmod(time - self._since, cycle)
+        return self._phase(time - self._since, away)
+
+    def _phase(self, lasted: float, away: Motion) -> Motion:
+        """The motion after some seconds of the sequence; every second round is to the other side."""
+        config = self._config
+        cycle = config.away_time + 2.0 * config.turn_time + config.back_time + config.side_time
+        rounds, left = divmod(lasted, cycle)
         side = self._side if int(rounds) % 2 == 0 else -self._side
-        if phase < config.turn_time:
-            return Motion(0.0, 0.0, side * config.yaw_rate)
-        phase -= config.turn_time
-        if phase < config.back_time:
-            return Motion(-config.back_speed, 0.0, 0.0)
-        phase -= config.back_time
-        if phase < config.turn_time:
-            return Motion(0.0, 0.0, -side * config.yaw_rate)
+        turn = Motion(0.0, 0.0, side * config.yaw_rate)
+        for length, motion in (
+            (config.away_time, away if any(away) else turn),
+            (config.turn_time, turn),
+            (config.back_time, Motion(-config.back_speed, 0.0, 0.0)),
+            (config.turn_time, Motion(0.0, 0.0, -side * config.yaw_rate)),
+        ):
+            if left < length:
+                return motion
+            left -= length
         return Motion(0.0, side * config.side_speed, 0.0)

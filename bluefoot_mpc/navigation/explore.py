@@ -37,12 +37,14 @@ class ExploreConfig:
     patience: float = 25.0  # s to come nearer to a goal
     avoid: float = 60.0  # s for which a goal is left alone that could not be reached
     avoid_radius: float = 0.5  # m around it
+    room: float = 0.5  # m around a place that is visited again
     stale: float = 200.0  # s without a visit after which a place is as good as new
 
     def __post_init__(self) -> None:
         require_positive(
             every=self.every, least_edge=self.least_edge, most_edge=self.most_edge, reached=self.reached,
             patience=self.patience, avoid=self.avoid, avoid_radius=self.avoid_radius, stale=self.stale,
+            room=self.room,
         )  # fmt: skip
         require_nonnegative(edge_gain=self.edge_gain, turn_cost=self.turn_cost, loyalty=self.loyalty)
 
@@ -147,7 +149,7 @@ class Explorer:
 
     def _long_not_visited(self, found: Ways, age: FloatArray, grid: MapGrid) -> tuple[int, int] | None:
         config = self._config
-        flat = np.flatnonzero(np.isfinite(found.cost) & (found.room >= self._plan.room))
+        flat = np.flatnonzero(np.isfinite(found.cost) & (found.room >= self._config.room))
         if not flat.size:
             return None
         cells = np.column_stack(np.unravel_index(flat, found.cost.shape))

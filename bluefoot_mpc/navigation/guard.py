@@ -16,18 +16,19 @@ from typing import NamedTuple
 import numpy as np
 
 from bluefoot_mpc.navigation.limits import Motion
-from bluefoot_mpc.navigation.outline import OutlineConfig, RampConfig, closest, distances, places
+from bluefoot_mpc.navigation.outline import Foresight, OutlineConfig, RampConfig, closest, distances
 from bluefoot_mpc.settings import require_nonnegative, require_positive
-from bluefoot_mpc.types import FloatArray
+from bluefoot_mpc.types import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class GuardConfig:
     """Distances to keep, and how motions are weighed against each other."""
 
-    least: float = 0.15  # m from the outline that no motion goes below
+    least: float = 0.14  # m from the outline that no motion goes below
     comfortable: float = 0.25  # m; nearer costs
-    away: float = 0.01  # m that a robot which is too near must gain by a motion
+    away: float = 0.005  # m that a robot which is too near must gain by a motion
+    slack: float = 0.004  # m that it may lose on the way
     reach: float = 1.0  # m around the robot from which points are looked at
     sectors: int = 72  # around the robot; of each the nearest point counts
     speed_cost: float = 1.0  # of a difference of `speed_unit`
@@ -46,7 +47,7 @@ class GuardConfig:
         )  # fmt: skip
         require_nonnegative(
             speed_cost=self.speed_cost, turn_cost=self.turn_cost, side_cost=self.side_cost,
-            near_cost=self.near_cost,
+            near_cost=self.near_cost, slack=self.slack,
         )  # fmt: skip
 
 
@@ -76,6 +77,7 @@ class Guard:
     def __init__(self, config: GuardConfig) -> None:
         self._config = config
         self._motions = _choices()
+        self._foresight = Foresight(config.ramp)
 
     def step(self, points: FloatArray, wanted: Motion, now: Motion) -> Guarded:
         """Judge a wanted motion.
@@ -86,36 +88,57 @@ class Guard:
             now: what the gait does at present.
         """
         config = self._config
-        near = self._nearest(points)
+        near = points[(points * points).sum(axis=1) < config.reach**2]
         clearance = float(distances(near, config.outline).min(initial=np.inf))
+        if clearance - self._foresight.reach(now, wanted) >= config.comfortable:
+            return Guarded(wanted, clearance, changed=False, stopped=False)
         single = np.array((wanted,))
-        along = closest(near, places(now, single, config.ramp), config.outline)
+        along = closest(near, self._foresight.places(now, single), config.outline)
         if along.min() >= config.comfortable:
             return Guarded(wanted, clearance, changed=False, stopped=False)
-        motions = np.vstack((single, self._motions))
-        along = closest(near, places(now, motions, config.ramp), config.outline)
+        motions = np.concatenate((single, self._motions))
+        near = self._thinned(near)
+        along = closest(near, self._foresight.places(now, motions), config.outline)
         least = along.min(axis=1)
-        good = (least >= config.least) | ((least >= clearance) & (along[:, -1] >= clearance + config.away))
-        if not good.any():
-            return Guarded(Motion(), clearance, changed=any(wanted), stopped=True)
-        cost = np.where(good, self._cost(motions, wanted, least), np.inf)
+        cost = np.where(self._admissible(along, least, clearance), self._cost(motions, wanted, least), np.inf)
         best = int(cost.argmin())
+        if not np.isfinite(cost[best]):
+            return Guarded(Motion(), clearance, changed=any(wanted), stopped=True)
         return Guarded(Motion(*motions[best].tolist()), clearance, changed=best > 0, stopped=False)
 
-    def _nearest(self, points: FloatArray) -> FloatArray:
-        """(m, 2) the nearest point of each sector around the robot within reach."""
+    def away(self, points: FloatArray, now: Motion) -> Motion:
+        """The motion that gains most clearance without losing any; standing where none does.
+
+        Args:
+            points: (n, 2) m, what stands around the robot, in the robot frame.
+            now: what the gait does at present.
+        """
         config = self._config
-        square = points[:, 0] ** 2 + points[:, 1] ** 2
-        inside = np.flatnonzero(square < config.reach**2)
-        if inside.size <= config.sectors:
-            return np.ascontiguousarray(points[inside])
-        points, square = points[inside], square[inside]
+        near = self._thinned(points[(points * points).sum(axis=1) < config.reach**2])
+        clearance = float(distances(near, config.outline).min(initial=np.inf))
+        along = closest(near, self._foresight.places(now, self._motions), config.outline)
+        good = self._admissible(along, along.min(axis=1), clearance)
+        gain = np.where(good, np.minimum(along[:, -1], 2.0 * config.comfortable), -np.inf)
+        best = int(gain.argmax())
+        return Motion(*self._motions[best].tolist()) if gain[best] > clearance else Motion()
+
+    def _admissible(self, along: FloatArray, least: FloatArray, clearance: float) -> BoolArray:
+        """(k,) True for motions that stay clear, or that lead away from where it is too near already."""
+        config = self._config
+        leaves = (least >= clearance - config.slack) & (along[:, -1] >= clearance + config.away)
+        return np.asarray((least >= config.least) | leaves)
+
+    def _thinned(self, points: FloatArray) -> FloatArray:
+        """(m, 2) the nearest point of each sector around the robot."""
+        count = self._config.sectors
+        if len(points) <= count:
+            return points
         angle = np.arctan2(points[:, 1], points[:, 0])
-        sector = ((angle + np.pi) * (config.sectors / (2.0 * np.pi))).astype(np.intp)
-        order = np.argsort(-square)
-        last = np.full(config.sectors + 1, -1)
+        sector = ((angle + np.pi) * (count / (2.0 * np.pi))).astype(np.intp)
+        order = np.argsort(-(points * points).sum(axis=1))
+        last = np.full(count + 1, -1)
         last[sector[order]] = order  # the nearest is written last
-        return np.ascontiguousarray(points[last[last >= 0]])
+        return np.asarray(points[last[last >= 0]])
 
     def _cost(self, motions: FloatArray, wanted: Motion, least: FloatArray) -> FloatArray:
         config = self._config

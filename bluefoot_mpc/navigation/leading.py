@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from bluefoot_mpc.navigation.explore import Explorer
 from bluefoot_mpc.navigation.limits import Motion
 from bluefoot_mpc.navigation.marker_task import MarkerTask, MarkerWish
 from bluefoot_mpc.navigation.plan import GoalWay
-from bluefoot_mpc.navigation.potential_field import Field, Pace
+from bluefoot_mpc.navigation.potential_field import Field, Pace, PotentialField
 from bluefoot_mpc.navigation.scan import LevelScan
 from bluefoot_mpc.navigation.surroundings import Surroundings
 from bluefoot_mpc.navigation.waypoints import Waypoints
@@ -43,6 +44,7 @@ class Leading:
 
     def __init__(self, config: NavigationConfig, mounts: SensorMounts) -> None:
         self._config = config
+        self._potential = PotentialField(config.field)
         self._explorer = Explorer(config.explore, config.plan)
         self._goal_way = GoalWay(config.plan, every=0.5, tolerance=0.6)
         self._marker = MarkerTask(config.marker, mounts)
@@ -113,7 +115,7 @@ class Leading:
             scan: the new sweep.
         """
         config = self._config.field
-        self.field = potential_field.field(scan.bearing, scan.distance, config)
+        self.field = self._potential.step(scan.bearing, scan.distance)
         self._pace = potential_field.advance(self._pace, self.field, config)
         if guide.task is GuideTask.WANDER:
             return Lead(Guided.FIELD, self._onwards(guide, around))
@@ -143,8 +145,8 @@ class Leading:
     def _to_goal(self, goal: FloatArray, way: FloatArray, speed: float, around: Surroundings) -> Motion:
         """Along a way, and over its last piece without turning."""
         config = self._config.route
-        place = around.pose.to_robot(goal[None])[0]
-        far = float(np.hypot(place[0], place[1]))
+        place = route.in_robot(around.pose, *goal.tolist())
+        far = math.hypot(*place)
         if far <= config.glide:
             return route.gliding_to(place, speed, config)
         if not len(way):

@@ -78,7 +78,7 @@ class PointMemory:
         self._pose = pose
         self._sweeps += 1
         keep = self._kept(scan, pose)
-        fresh = pose.to_odometry(self._nearest(scan))
+        fresh = pose.to_odometry(nearest(scan, config))
         now = np.broadcast_to(np.array((scan.time, self._travel, 0.0)), (len(fresh), 3))
         self._points = np.concatenate((self._points[keep], fresh))[-config.capacity :]
         self._seen = np.concatenate((self._seen[keep], now))[-config.capacity :]
@@ -107,17 +107,6 @@ class PointMemory:
             ~shown & young & (self._seen[:, 2] < config.misses) & (far < config.reach + config.same)
         )
 
-    def _nearest(self, scan: LevelScan) -> FloatArray:
-        """(m, 2) m, in the robot frame: of each few rays the nearest end that is a thing within reach."""
-        config = self._config
-        count = scan.distance.size // config.rays * config.rays
-        skip = (scan.distance.size - count) // 2
-        distance = np.where(scan.hit, scan.distance, np.inf)[skip : skip + count].reshape(-1, config.rays)
-        column = distance.argmin(axis=1)
-        first = np.arange(skip, skip + count, config.rays)
-        near = distance[np.arange(column.size), column] < config.reach
-        return np.asarray(scan.points[(first + column)[near]])
-
     def _thin_out(self) -> None:
         """Keep the newest point of each small square."""
         cells = np.floor(self._points / self._config.cell).astype(np.int64)
@@ -125,3 +114,13 @@ class PointMemory:
         _, newest = np.unique(key[::-1], return_index=True)
         keep = np.sort(len(key) - 1 - newest)
         self._points, self._seen = self._points[keep], self._seen[keep]
+
+
+def nearest(scan: LevelScan, config: MemoryConfig) -> FloatArray:
+    """(m, 2) m, in the robot frame: of each few rays the nearest end that is a thing within reach."""
+    count = scan.distance.size // config.rays * config.rays
+    skip = (scan.distance.size - count) // 2
+    distance = np.where(scan.hit, scan.distance, np.inf)[skip : skip + count].reshape(-1, config.rays)
+    ray = distance.argmin(axis=1)
+    ray += np.arange(skip, skip + count, config.rays)
+    return np.asarray(scan.points[ray[scan.hit[ray] & (scan.distance[ray] < config.reach)]])

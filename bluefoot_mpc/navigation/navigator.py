@@ -17,6 +17,8 @@ from bluefoot_mpc.navigation.scan import LevelScan
 from bluefoot_mpc.navigation.surroundings import Surroundings
 from bluefoot_mpc.types import BodyState, FloatArray, Guide, Guided, NavigationReport, SensorFrame
 
+_NOWHERE = np.full(3, np.nan)
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Decision:
@@ -111,7 +113,8 @@ class Navigator:
             self._escape.begin(pose, time, self._around.openness())
             self._leading.give_up(time)
         if self._escape.active:
-            motion = self._escape.step(pose, time)
+            room = self._guard.away(self._around.points(), self._gait)
+            motion = self._escape.step(pose, time, room)
             if self._escape.active:
                 return Lead(Guided.ESCAPE, motion, "stuck: turning, backing off, stepping aside in turn")
             self._watch.reset()
@@ -129,13 +132,12 @@ class Navigator:
         leading, wish, scan = self._leading, self._leading.wish, self._around.scan
         velocity = np.array(self._motion[:2])
         pitch = 0.0 if wish is None else wish.pitch
-        nowhere = np.full(3, np.nan)
         report = NavigationReport(
             guided=self._lead.guided, velocity=velocity, yaw_rate=self._motion.yaw_rate, pitch=pitch,
             field=leading.field.force, potential=leading.field.potential,
             mixing=0.0 if wish is None else wish.mixing,
-            marker=nowhere if wish is None else wish.marker,
-            marker_position=nowhere if wish is None else wish.position,
+            marker=_NOWHERE.copy() if wish is None else wish.marker,
+            marker_position=_NOWHERE.copy() if wish is None else wish.position,
             marker_age=math.inf if wish is None else wish.age,
             clearance=self._clearance, waypoints_left=leading.waypoints.left,
             scan_time=math.nan if scan is None else scan.time, reason=self._lead.reason,

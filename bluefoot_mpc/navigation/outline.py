@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -37,14 +38,13 @@ class RampConfig:
     acceleration: float = 0.1  # m/s², of the gait's own ramp
     yaw_acceleration: float = 1.0  # rad/s², of the gait's own ramp
     hold: float = 0.4  # s for which a motion is kept before the robot could be stopping
-    step: float = 0.1  # s between places that are worked out
-    every: int = 3  # of these places the outline is compared with the points
-    steps: int = 18  # places
+    step: float = 0.3  # s between places that are looked at
+    steps: int = 6  # places
 
     def __post_init__(self) -> None:
         require_positive(
             acceleration=self.acceleration, yaw_acceleration=self.yaw_acceleration, step=self.step,
-            every=self.every, steps=self.steps,
+            steps=self.steps,
         )  # fmt: skip
         require_nonnegative(hold=self.hold)
 
@@ -73,29 +73,43 @@ def distances(points: FloatArray, config: OutlineConfig) -> FloatArray:
     return np.asarray(np.sqrt(x * x + y * y) - config.rounding)
 
 
-def places(now: Motion, motions: FloatArray, config: RampConfig) -> Places:
-    """Where (k, 3) motions lead that are held for a while and then ended, by the gait's ramps.
+class Foresight:
+    """Where motions lead that are held for a while and then ended, by the gait's ramps.
 
     Args:
-        now: what the gait does at present.
-        motions: (k, 3) m/s forward and left, rad/s.
         config: ramps and times.
     """
-    time = (np.arange(config.steps) + 0.5) * config.step
-    ramp = np.array((config.acceleration, config.acceleration, config.yaw_acceleration))
-    start = np.array(now)
-    way = motions[:, :, None] - start[None, :, None]
-    reach = ramp[:, None] * np.minimum(time, config.hold)
-    rate = start[None, :, None] + np.clip(way, -reach, reach)
-    fade = ramp[:, None] * np.maximum(time - config.hold, 0.0)
-    rate = np.sign(rate) * np.maximum(np.abs(rate) - fade, 0.0)
-    turned = np.cumsum(rate[:, 2], axis=1) * config.step
-    middle = turned - 0.5 * config.step * rate[:, 2]
-    cos, sin = np.cos(middle), np.sin(middle)
-    x = np.cumsum(cos * rate[:, 0] - sin * rate[:, 1], axis=1) * config.step
-    y = np.cumsum(sin * rate[:, 0] + cos * rate[:, 1], axis=1) * config.step
-    pick = slice(config.every - 1, None, config.every)
-    return Places(x[:, pick], y[:, pick], turned[:, pick])
+
+    def __init__(self, config: RampConfig) -> None:
+        self._config = config
+        time = (np.arange(config.steps) + 0.5) * config.step
+        ramp = np.array((config.acceleration, config.acceleration, config.yaw_acceleration))[:, None]
+        self._reach = ramp * np.minimum(time, config.hold)
+        self._fade = ramp * np.maximum(time - config.hold, 0.0)
+
+    def places(self, now: Motion, motions: FloatArray) -> Places:
+        """The places of (k, 3) motions, m/s forward and left and rad/s, from what the gait does now."""
+        step = self._config.step
+        start = np.array(now)[:, None]
+        way = np.minimum(motions[:, :, None] - start, self._reach)
+        np.maximum(way, -self._reach, out=way)
+        way += start
+        rate = np.copysign(np.maximum(np.abs(way) - self._fade, 0.0), way)
+        rate *= step
+        turned = rate[:, 2].cumsum(axis=1)
+        middle = turned - 0.5 * rate[:, 2]
+        cos, sin = np.cos(middle), np.sin(middle)
+        x = (cos * rate[:, 0] - sin * rate[:, 1]).cumsum(axis=1)
+        y = (sin * rate[:, 0] + cos * rate[:, 1]).cumsum(axis=1)
+        return Places(x, y, turned)
+
+    def reach(self, now: Motion, wanted: Motion) -> float:
+        """m, more than the way of any part of the robot until it has stopped (its corners are 0.3 m out)."""
+        config = self._config
+        fast = max(math.hypot(now.x, now.y), math.hypot(wanted.x, wanted.y))
+        turn = max(abs(now.yaw_rate), abs(wanted.yaw_rate))
+        straight = fast * (config.hold + 0.5 * fast / config.acceleration)
+        return straight + 0.3 * turn * (config.hold + 0.5 * turn / config.yaw_acceleration)
 
 
 def closest(points: FloatArray, where: Places, outline: OutlineConfig) -> FloatArray:

@@ -55,4 +55,9 @@ class PoseHistory:
 
     def at(self, time: float) -> BodyState:
         """The kept estimate nearest to a time (s)."""
-        return min(self._states, key=lambda state: abs(state.time - time))
+        best = self._states[-1]
+        for state in reversed(self._states):
+            if abs(state.time - time) > abs(best.time - time):
+                break
+            best = state
+        return best

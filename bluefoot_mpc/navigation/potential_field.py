@@ -88,6 +88,33 @@ def field(bearing: FloatArray, distance: FloatArray, config: FieldConfig) -> Fie
     return summed(weights(bearing, config), directions, distance, config)
 
 
+class PotentialField:
+    """The same law, with what depends on the bearings alone kept from sweep to sweep.
+
+    Args:
+        config: the law's parameters.
+    """
+
+    def __init__(self, config: FieldConfig) -> None:
+        self._config = config
+        self._bearing = np.zeros(0)
+        self._weight = np.zeros(0)
+        self._directions = np.zeros((0, 2))
+
+    def step(self, bearing: FloatArray, distance: FloatArray) -> Field:
+        """The field of a sweep.
+
+        Args:
+            bearing: (n,) rad from forward; the same array as before is taken to hold the same values.
+            distance: (n,) m.
+        """
+        if bearing is not self._bearing:
+            self._bearing = bearing
+            self._weight = weights(bearing, self._config)
+            self._directions = np.column_stack((np.cos(bearing), np.sin(bearing)))
+        return summed(self._weight, self._directions, distance, self._config)
+
+
 def summed(weight: FloatArray, directions: FloatArray, distance: FloatArray, config: FieldConfig) -> Field:
     """The field, where the (n,) weights and (n, 2) unit vectors of the rays are known already."""
     force = weight * forces(distance, config)

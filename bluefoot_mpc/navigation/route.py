@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from bluefoot_mpc.navigation.limits import Motion
 from bluefoot_mpc.navigation.pose import Pose
 from bluefoot_mpc.settings import require_positive, require_range
 from bluefoot_mpc.types import FloatArray
+
+STEP = 0.1
+"""m between the places of a way: squares of the map."""
+
+Place = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -34,33 +37,40 @@ class RouteConfig:
         require_range(5.0, 90.0, turn_first_deg=self.turn_first_deg)
 
 
-def ahead_on(way: FloatArray, pose: Pose, lookahead: float) -> FloatArray:
-    """(2,) m in the robot frame: the place on the way a little ahead of the robot.
+def ahead_on(way: FloatArray, pose: Pose, lookahead: float) -> Place:
+    """The place on the way a little ahead of the robot, in the robot frame.
 
     Args:
-        way: (k, 2) m in the odometry frame, k > 0.
+        way: (k, 2) m in the odometry frame, k > 0, at least about `STEP` apart.
         pose: of the robot.
-        lookahead: m.
+        lookahead: m; counted in steps of the way.
     """
-    rel = pose.to_robot(way)
-    nearest = int((rel[:, 0] ** 2 + rel[:, 1] ** 2).argmin())
-    lengths = np.hypot(*np.diff(rel[nearest:], axis=0).T)
-    last = nearest + int(np.searchsorted(np.cumsum(lengths), lookahead))
-    return np.asarray(rel[min(last, len(rel) - 1)])
+    offset = way - pose[:2]
+    offset *= offset
+    last = int(offset.sum(axis=1).argmin()) + round(lookahead / STEP)
+    x, y = way[min(last, len(way) - 1)].tolist()
+    return in_robot(pose, x, y)
 
 
-def towards(place: FloatArray, field: FloatArray, speed: float, config: RouteConfig) -> Motion:
+def in_robot(pose: Pose, x: float, y: float) -> Place:
+    """A place of the odometry frame in the robot frame, m."""
+    cos, sin, dx, dy = math.cos(pose.yaw), math.sin(pose.yaw), x - pose.x, y - pose.y
+    return cos * dx + sin * dy, cos * dy - sin * dx
+
+
+def towards(place: Place, field: FloatArray, speed: float, config: RouteConfig) -> Motion:
     """The motion towards a place, bent by the potential field.
 
     Args:
-        place: (2,) m in the robot frame.
+        place: m in the robot frame.
         field: (2,) sum of the field's forces.
         speed: m/s, where nothing is to be turned.
         config: how a way is followed.
     """
-    direction = config.share * _unit(place) + (1.0 - config.share) * _unit(field)
-    bearing = math.atan2(float(direction[1]), float(direction[0]))
-    return turning_to(bearing, speed, config)
+    (x, y), (fx, fy) = place, field.tolist()
+    one = config.share / max(math.hypot(x, y), 1e-9)
+    other = (1.0 - config.share) / max(math.hypot(fx, fy), 1e-9)
+    return turning_to(math.atan2(one * y + other * fy, one * x + other * fx), speed, config)
 
 
 def turning_to(bearing: float, speed: float, config: RouteConfig) -> Motion:
@@ -71,13 +81,8 @@ def turning_to(bearing: float, speed: float, config: RouteConfig) -> Motion:
     return Motion(speed * share, 0.0, turn)
 
 
-def gliding_to(place: FloatArray, speed: float, config: RouteConfig) -> Motion:
-    """The motion to a near place (2,) m in the robot frame, without turning."""
-    x, y = (config.glide_gain * place).tolist()
+def gliding_to(place: Place, speed: float, config: RouteConfig) -> Motion:
+    """The motion to a near place, without turning."""
+    x, y = config.glide_gain * place[0], config.glide_gain * place[1]
     share = min(1.0, speed / max(math.hypot(x, y), 1e-9))
     return Motion(share * x, share * y, 0.0)
-
-
-def _unit(vector: FloatArray) -> FloatArray:
-    length = math.hypot(*vector.tolist())
-    return vector / length if length > 0.0 else np.zeros(2)

@@ -73,7 +73,7 @@ class ScanReader:
     def __init__(self, config: ScanConfig, mounts: SensorMounts) -> None:
         self._config = config
         self._mount = mounts.lidar
-        self._bearing = np.zeros(0)
+        self._bearing = self._newest = np.zeros(0)
         self._directions = np.zeros((0, 2))
         self._fault = "no rays"
 
@@ -93,24 +93,38 @@ class ScanReader:
         if not echo.any():
             return "no echo in the whole sweep"
         distance = np.where(echo, raw, config.greatest_range)
-        points, height, origin = self._levelled(distance, estimate)
-        hit = echo & (height > config.floor_height + config.floor_slope * distance)
+        level, rise, origin, lift = self._tilted(estimate)
+        points = (self._directions @ level) * distance[:, None]
+        points += origin
         return LevelScan(
-            time=scan.time, bearing=self._bearing, distance=distance, points=points, hit=hit, origin=origin
-        )
+            time=scan.time, bearing=self._bearing, distance=distance, points=points,
+            hit=echo & np.logical_not(self._on_the_floor(distance, rise, lift)), origin=origin,
+        )  # fmt: skip
 
-    def _levelled(
-        self, distance: FloatArray, estimate: BodyState
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Ends of the rays: (n, 2) in the robot frame and (n,) above the feet; and (2,) the LIDAR."""
+    def _tilted(self, estimate: BodyState) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        """How the tilt turns the sensor's plane.
+
+        Returns:
+            (2, 2) from directions in the plane to the level, (2,) their rise per metre, (2,) the LIDAR in the
+            robot frame (m), and its height above the feet (m).
+        """
         roll, pitch, _ = estimate.rpy.tolist()
         cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
         x, y, z = self._mount
         origin = np.array((cp * x + sp * (sr * y + cr * z), cr * y - sr * z))
         lift = -sp * x + cp * (sr * y + cr * z) + estimate.height
-        level = self._directions @ np.array(((cp, 0.0), (sp * sr, cr)))
-        rise = self._directions @ np.array((-sp, cp * sr))
-        return origin + distance[:, None] * level, lift + distance * rise, origin
+        level = np.array(((cp, 0.0), (sp * sr, cr)))
+        return level, np.array((-sp, cp * sr)), origin, lift
+
+    def _on_the_floor(self, distance: FloatArray, rise: FloatArray, lift: float) -> BoolArray | bool:
+        """(n,) True where a ray ends so low that it must have met the floor; False where none can."""
+        config = self._config
+        steepest = math.hypot(*rise.tolist()) + config.floor_slope
+        if lift - config.greatest_range * steepest > config.floor_height:
+            return False
+        return np.asarray(
+            lift + distance * (self._directions @ rise - config.floor_slope) < config.floor_height
+        )
 
     def _unusable(self, scan: LidarScan) -> str:
         """Why the sweep is of no use; empty where it is."""
@@ -118,8 +132,9 @@ class ScanReader:
             return "sweep marked as invalid"
         if scan.bearing.shape != scan.distance.shape or scan.bearing.ndim != 1:
             return "bearings and distances do not match"
-        if not np.array_equal(scan.bearing, self._bearing):
+        if scan.bearing is not self._newest and not np.array_equal(scan.bearing, self._bearing):
             self._take_bearings(np.array(scan.bearing, dtype=np.float64))
+        self._newest = scan.bearing
         return self._fault
 
     def _take_bearings(self, bearing: FloatArray) -> None:

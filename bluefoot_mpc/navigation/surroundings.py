@@ -1,6 +1,6 @@
 """What the robot knows of its surroundings: newest sweep, points out of sight, coarse map.
 
-A tick that brings a sweep takes in its points; the map can follow on the next
+A tick that brings a sweep sees its points; memory and map can follow on the next
 tick, so that no tick has to do everything.
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.navigation.config import NavigationConfig
 from bluefoot_mpc.navigation.grid import MapGrid
-from bluefoot_mpc.navigation.memory import PointMemory
+from bluefoot_mpc.navigation.memory import PointMemory, nearest
 from bluefoot_mpc.navigation.pose import Pose, PoseHistory, pose_of
 from bluefoot_mpc.navigation.scan import LevelScan, ScanReader
 from bluefoot_mpc.types import BodyState, FloatArray, LidarScan, SensorFrame
@@ -48,6 +48,7 @@ class Surroundings:
         self.pose = Pose(0.0, 0.0, 0.0)
         self.scan: LevelScan | None = None
         self._pending: tuple[LevelScan, Pose] | None = None
+        self._fresh: FloatArray | None = None
         self._fault = _NO_SWEEP
 
     def step(self, frame: SensorFrame, estimate: BodyState) -> bool:
@@ -57,16 +58,18 @@ class Surroundings:
         return frame.lidar is not None and self._take(frame.lidar)
 
     def settle(self) -> bool:
-        """Put the newest sweep into the map, if that has not been done; True where it has just been."""
+        """Put the newest sweep into memory and map; False where that had been done."""
         if self._pending is None:
             return False
+        self._memory.step(*self._pending)
         self.grid.step(*self._pending)
-        self._pending = None
+        self._pending = self._fresh = None
         return True
 
     def points(self) -> FloatArray:
         """(n, 2) m in the robot frame: the nearest things around it, out of sight ones too."""
-        return self.pose.to_robot(self._memory.points)
+        known = self.pose.to_robot(self._memory.points)
+        return known if self._fresh is None else np.concatenate((self._fresh, known))
 
     def blind(self, time: float) -> str:
         """Why the robot cannot see at a time (s); empty while it can."""
@@ -98,6 +101,8 @@ class Surroundings:
         self._fault = ""
         self.scan = result
         pose = pose_of(state)
-        self._memory.step(result, pose)
         self._pending = (result, pose)
+        self._fresh = nearest(result, self._config.memory)
+        if pose != self.pose:
+            self._fresh = self.pose.to_robot(pose.to_odometry(self._fresh))
         return True
