@@ -48,6 +48,19 @@ def test_robot_stands_in_every_world(model, name):
     assert np.abs(truth.foot_height).max() < 3e-4
 
 
+def test_things_of_a_user_s_world_are_told_from_its_ground(model, tmp_path):
+    file = tmp_path / "boxes.xml"
+    file.write_text(BOX_WORLD)
+    robot = SimRobot(model, SimConfig(world=WorldConfig(name=str(file))))
+    groups = {name: robot.model.geom(f"world_{name}").group[0] for name in ("ground", "curb")}
+    assert groups == {"ground": 0, "curb": 1}
+    truth = robot.truth()
+    # The curb's near face is half a metre ahead, and the knees reach farther out than the feet.
+    front = truth.foot_position[:, 0].max()
+    assert 0.5 - front - 0.05 < truth.clearance < 0.5 - front
+    assert truth.collisions == ()
+
+
 def test_flat_ground_is_at_zero(model):
     ground = SimRobot(model, SimConfig()).ground
     assert ground.height(3.0, -2.0) == 0.0
@@ -117,9 +130,9 @@ def test_world_file_that_is_no_model_is_refused(model, tmp_path):
 
 
 def test_unknown_world_names_the_valid_ones():
-    with pytest.raises(UnknownNameError, match=r"Did you mean 'slope'.*flat, rough, slope, steps"):
+    with pytest.raises(UnknownNameError, match=r"Did you mean 'slope'.*arena, .*maze, .*slope, steps"):
         WorldConfig(name="slopes")
-    with pytest.raises(ConfigurationError, match=r"no world file 'none\.xml'.*flat, rough"):
+    with pytest.raises(ConfigurationError, match=r"no world file 'none\.xml'.*a plan .*flat, rough"):
         WorldConfig(name="none.xml")
 
 

@@ -15,8 +15,8 @@ _LEAST_ROOM = 2.3  # m along the corridor
 
 def corridors(rng: np.random.Generator) -> Layout:
     """Three or four rooms along a corridor, each with a door; two neighbours may have one between them."""
-    length, width = float(rng.uniform(5.6, 6.6)), float(rng.uniform(1.4, 1.7))
-    depths = rng.uniform(2.1, 2.7, 2)
+    length, width = float(rng.uniform(5.6, 6.4)), float(rng.uniform(1.4, 1.7))
+    depths = rng.uniform(2.1, 2.5, 2)
     bounds = (0.0, -float(depths[0]), length, width + float(depths[1]))
     layout = Layout(bounds)
     layout.enclose()

@@ -73,14 +73,20 @@ def reachable(plan: WorldPlan, radius: float = ROBOT_RADIUS, cell: float = CELL)
     x0, y0, x1, y1 = plan.bounds
     rows, columns = math.ceil((y1 - y0) / cell - 1e-9), math.ceil((x1 - x0) / cell - 1e-9)
     points = _cell_points((x0, y0), cell, rows, columns)
-    away = footprint.nearest(points, _obstacles(plan)).reshape(rows, columns)
+    grid_points = points.reshape(rows, columns, 2)
+    away = np.full((rows, columns), np.inf)
+    for solid in _obstacles(plan):
+        near = _around(solid, radius, (x0, y0), cell)
+        here = grid_points[near]
+        found = footprint.distance(here.reshape(-1, 2), solid).reshape(here.shape[:2])
+        away[near] = np.minimum(away[near], found)
     inside = _inside(points, plan.bounds, radius).reshape(rows, columns)
     parts, _ = label((away >= radius) & inside)
     start = parts[math.floor(-y0 / cell), math.floor(-x0 / cell)]
     centres = (parts == start) & (start > 0)
     floor = away > 0.0
     if centres.any():
-        floor &= distance_transform_edt(~centres) * cell <= radius
+        floor &= distance_transform_edt(~centres) * cell <= radius + 0.5 * cell
     else:
         floor = np.zeros_like(centres)
     return Grid(corner=(x0, y0), cell=cell, centres=centres, floor=floor)
@@ -210,6 +216,14 @@ def _obstacles(plan: WorldPlan) -> tuple[Solid, ...]:
     return *solids, Solid(
         name="marker_disc", shape="cylinder", x=marker.x, y=marker.y, z=0.5 * size[2], size=size
     )
+
+
+def _around(solid: Solid, margin: float, corner: tuple[float, float], cell: float) -> tuple[slice, slice]:
+    """Rows and columns of the cells within a margin (m) of a solid, and some more."""
+    ends = footprint.corners(solid)
+    low = np.maximum(np.floor((ends.min(axis=0) - margin - corner) / cell), 0.0).astype(int)
+    high = np.maximum(np.ceil((ends.max(axis=0) + margin - corner) / cell), 0.0).astype(int)
+    return slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0]))
 
 
 def _inside(points: FloatArray, bounds: tuple[float, float, float, float], margin: float) -> BoolArray:

@@ -71,9 +71,8 @@ def _standing(solid: Any) -> Any:
     if not isinstance(solid, Mapping) or "z" in solid:
         return solid
     size = solid.get("size")
-    if isinstance(size, list) and len(size) == 3 and isinstance(size[2], (int, float)):
-        return {**solid, "z": 0.5 * size[2]}
-    return solid
+    is_size = isinstance(size, list) and len(size) == 3 and isinstance(size[2], (int, float))
+    return {**solid, "z": 0.5 * size[2] if is_size else 0.0}  # a wrong size is told later
 
 
 def _require_start(plan: WorldPlan) -> None:

@@ -80,6 +80,9 @@ def are_apart(one: Solid, other: Solid, least: float) -> bool:
 
 def gap(one: Solid, other: Solid) -> float:
     """Distance between two solids seen from above, m, to about a millimetre; negative where they overlap."""
+    for solid, around in ((one, other), (other, one)):
+        if solid.shape == "cylinder":
+            return float(distance(np.array([[solid.x, solid.y]]), around)[0]) - 0.5 * solid.size[0]
     return float(min(distance(outline(one), other).min(), distance(outline(other), one).min()))
 
 

@@ -39,7 +39,7 @@ class _Thing:
 
 def chairs(rng: np.random.Generator) -> Layout:
     """A room with a table, chairs about the room, by its walls and one at the table, and boxes."""
-    layout = Layout(some_bounds(rng, (6.0, 7.2), (5.2, 6.2)))
+    layout = Layout(some_bounds(rng, (6.0, 6.9), (5.2, 5.9)))
     layout.enclose()
     _place_table(layout, rng)
     for _ in range(int(rng.integers(3, 6))):

@@ -7,7 +7,7 @@ import numpy as np
 from bluefoot_mpc.sim.worlds.lattice import STEPS, Cell, Lattice, lines
 from bluefoot_mpc.sim.worlds.layout import Layout
 
-_SPACING = (1.32, 1.50)
+_SPACING = (1.32, 1.46)
 """m between the middles of walls, which are 0.10 m thick."""
 
 _CORRIDORS = (3, 2, 2, 1, 1)

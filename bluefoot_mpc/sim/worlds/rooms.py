@@ -24,7 +24,7 @@ from bluefoot_mpc.sim.worlds.plan import Solid
 NEAR_MARKER: Colour = (0.80, 0.22, 0.52)
 """Colour of the arena's misleading wall: the marker's hue, a little paler."""
 
-ARENA_FREE: Bounds = (-1.0, -1.9, 4.4, 1.9)
+ARENA_FREE: Bounds = (-1.0, -2.4, 3.8, 2.4)
 """m, least x, least y, greatest x, greatest y: nothing stands here in the arena, whatever the seed."""
 
 _TRIES = 100
@@ -32,7 +32,7 @@ _TRIES = 100
 
 def room(rng: np.random.Generator) -> Layout:
     """A rectangular room with upright cylinders and up to two stubs of wall."""
-    layout = Layout(some_bounds(rng, (5.6, 7.4), (4.6, 6.0)))
+    layout = Layout(some_bounds(rng, (5.6, 7.0), (4.6, 5.8)))
     layout.enclose()
     for _ in range(int(rng.integers(0, 3))):
         add_stub(layout, rng)
@@ -44,8 +44,8 @@ def room(rng: np.random.Generator) -> Layout:
 def arena(rng: np.random.Generator) -> Layout:
     """A big room, free in the middle, things along its walls, one wall nearly of the marker's colour."""
     x0, y0, x1, y1 = ARENA_FREE
-    room_left, room_ahead = float(rng.uniform(0.9, 1.2)), float(rng.uniform(0.9, 1.2))
-    side = rng.uniform(0.9, 1.2, 2)
+    room_left, room_ahead = float(rng.uniform(0.7, 1.0)), float(rng.uniform(0.7, 1.0))
+    side = rng.uniform(0.7, 1.0, 2)
     layout = Layout((x0 - room_left, y0 - float(side[0]), x1 + room_ahead, y1 + float(side[1])))
     colours = [WALL] * 4
     # Mostly where the robot looks while it follows.

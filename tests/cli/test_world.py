@@ -1,0 +1,85 @@
+"""``bluefoot world``: plans told, written and drawn."""
+
+import json
+
+import pytest
+
+from bluefoot_mpc.cli.main import main
+from bluefoot_mpc.sim.worlds.files import read_plan
+from bluefoot_mpc.sim.worlds.make import KINDS, make_plan
+
+
+def run(capfd, *words):
+    status = main(["world", *words, "--json"])
+    return status, json.loads(capfd.readouterr().out)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_is_told(capfd, kind):
+    status, data = run(capfd, kind, "--seed", "2")
+    assert status == 0
+    assert data["plan"]["name"] == kind
+    assert len(data["plan"]["solids"]) == len(make_plan(kind, 2).solids)
+    assert data["reachable_m2"] > 15.0
+
+
+def test_page_tells_what_stands_where_and_how_to_go_there(capsys):
+    assert main(["world", "chairs", "--seed", "1"]) == 0
+    text = capsys.readouterr().out
+    assert "4 wall" in text
+    assert "1 table" in text
+    assert "bluefoot run wander --world chairs --seed 1" in text
+    assert main(["world", "hidden"]) == 0
+    text = capsys.readouterr().out
+    assert "marker at x" in text
+    assert "bluefoot run approach" in text
+
+
+def test_file_is_written_and_can_be_read_again(capfd, tmp_path):
+    file = tmp_path / "sub" / "mine.toml"
+    assert run(capfd, "dead_ends", "--seed", "4", "--out", str(file))[0] == 0
+    assert read_plan(file) == make_plan("dead_ends", 4)
+    status, data = run(capfd, str(file))
+    assert (status, data["plan"]["name"]) == (0, "dead_ends")
+
+
+@pytest.mark.parametrize(
+    ("name", "start"), [("w.png", b"\x89PNG"), ("w.svg", b"<?xml"), ("w.html", b"<!doctype html>")]
+)
+def test_pictures(capfd, tmp_path, name, start):
+    file = tmp_path / name
+    assert run(capfd, "hidden", "--picture", str(file))[1]["files"] == [str(file)]
+    assert file.read_bytes().startswith(start)
+
+
+def test_page_draws_every_solid_and_the_marker(capfd, tmp_path):
+    file = tmp_path / "w.html"
+    run(capfd, "hidden", "--picture", str(file))
+    text = file.read_text(encoding="utf-8")
+    assert "screen1" in text
+    assert "marker" in text
+    assert "hidden, seed 0" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "cause"),
+    [
+        (["castle"], "unknown world 'castle'"),
+        (["flat"], "unknown kind of world 'flat'"),
+        (["no.toml"], "no world file"),
+        (["room", "--seed", "-1"], "must not be negative"),
+        (["room", "--out", "x.txt"], "ends with .toml"),
+        (["room", "--picture", "x.gif"], "must end with one of"),
+    ],
+)
+def test_wrong_use_is_told(capfd, words, cause):
+    status, data = run(capfd, *words)
+    assert status == 2
+    assert cause in data["error"]
+
+
+def test_picture_that_cannot_be_written(capfd, tmp_path):
+    (tmp_path / "file").touch()
+    status, data = run(capfd, "room", "--picture", str(tmp_path / "file" / "w.png"))
+    assert status == 2
+    assert "cannot write" in data["error"]
