@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import functools
+import gzip
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
@@ -26,6 +29,23 @@ def embed_json(value: Any) -> Markup:
 def embed_script(source: str) -> Markup:
     """JavaScript that may stand inside a ``<script>`` element."""
     return Markup(source.replace("</script", "<\\/script").replace("<!--", "\\x3c!--"))
+
+
+def scripts(sources: Sequence[str], *, packed: bool) -> dict[str, Any]:
+    """What a template needs to run scripts one after the other.
+
+    Args:
+        sources: JavaScript.
+        packed: True packs them, for pages that would become too large.
+    """
+    ready = [pack_script(source) if packed else embed_script(source) for source in sources]
+    return {"packed": packed, "scripts": ready, "unpack_script": embed_script(template_text("unpack.js"))}
+
+
+@functools.cache
+def pack_script(source: str) -> str:
+    """JavaScript as base64 of its gzip, a third of its size; `unpack.js` makes it run."""
+    return base64.b64encode(gzip.compress(source.encode("utf-8"), mtime=0)).decode("ascii")
 
 
 @functools.cache

@@ -19,6 +19,9 @@ from bluefoot_mpc.viz.style import COMMAND, ESTIMATE, LEG_COLOURS, NEUTRAL
 LIMIT = 4000
 """Most points of one line."""
 
+_EVEN = 1e-3
+"""Share of a step that times may differ from evenly spaced ones."""
+
 Trace = dict[str, Any]
 
 
@@ -85,13 +88,22 @@ def curve(
     return {
         "type": "scatter",
         "mode": "lines",
-        "x": pack(times),
+        **_along(times),
         "y": pack(values[:, 0]),
         "name": name,
         "yaxis": axis,
         "line": {"color": colour, "dash": dash, "width": width},
         "hovertemplate": "%{y:.3g}",
     }
+
+
+def _along(times: FloatArray) -> Trace:
+    """Times of a line; evenly spaced ones, as a simulator's are, as a start and a step."""
+    if len(times) > 2:
+        step = float(times[-1] - times[0]) / (len(times) - 1)
+        if step > 0.0 and np.abs(np.diff(times) - step).max() < _EVEN * step:
+            return {"x0": float(times[0]), "dx": step}
+    return {"x": pack(times)}
 
 
 def rows(count: int, titles: list[str], gap: float = 0.09) -> dict[str, Any]:

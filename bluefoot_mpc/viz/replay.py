@@ -14,8 +14,8 @@ from bluefoot_mpc.settings import build
 from bluefoot_mpc.viz.animation import player_script, viewer_script
 from bluefoot_mpc.viz.journey import journey_of
 from bluefoot_mpc.viz.live import LiveView
-from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
-from bluefoot_mpc.viz.report import figures, plotly_script
+from bluefoot_mpc.viz.page import embed_json, render, scripts
+from bluefoot_mpc.viz.report import drawing_scripts, figures
 from bluefoot_mpc.viz.series import extract
 from bluefoot_mpc.viz.stage import stage_of
 from bluefoot_mpc.viz.stage_motion import replay_data
@@ -72,10 +72,9 @@ def replay_html(run: RunData, robot: RobotModel) -> str:
         strip_after=journey.strip_after if journey is not None else "",
         run_data=embed_json(data),
         figures=embed_json(figures(panels, series)) if panels else "",
-        viewer_script=embed_script(viewer_script()),
-        plotly_script=embed_script(plotly_script()) if panels else "",
-        player_script=embed_script(player_script()),
-        report_script=embed_script(template_text("report.js")) if panels else "",
+        **scripts(
+            [viewer_script(), *(drawing_scripts() if panels else [player_script()])], packed=bool(panels)
+        ),
     )
 
 

@@ -14,7 +14,7 @@ from bluefoot_mpc.viz.animation import player_script, viewer_script
 from bluefoot_mpc.viz.journey import journey_of
 from bluefoot_mpc.viz.level_series import extract_leveling
 from bluefoot_mpc.viz.packing import stretches
-from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_text
+from bluefoot_mpc.viz.page import embed_json, render, scripts, template_text
 from bluefoot_mpc.viz.plan_series import extract_plans
 from bluefoot_mpc.viz.plots import Panel
 from bluefoot_mpc.viz.series import RunSeries, extract
@@ -78,10 +78,9 @@ def report_html(
         strip_after=journey.strip_after if journey is not None else "",
         run_data=embed_json(data),
         figures=embed_json(figures(panels, series)),
-        viewer_script=embed_script(viewer_script()) if has_ticks else "",
-        plotly_script=embed_script(plotly_script()),
-        player_script=embed_script(player_script()),
-        report_script=embed_script(template_text("report.js")),
+        **scripts(
+            [*([viewer_script()] if has_ticks else []), *drawing_scripts()], packed=journey is not None
+        ),
         configuration=dump_toml(run.config).strip() or "none recorded",
         versions=sorted((summary.get("versions") or {}).items()),
         all_figures=_flat(summary),
@@ -200,6 +199,11 @@ def _footer(series: RunSeries, ticks: int) -> str:
         else "Without simulator truth, everything is drawn from the robot's measurements and estimates."
     )
     return f"{ticks} ticks. {source} Angles: roll right side down, pitch nose down, yaw left positive."
+
+
+def drawing_scripts() -> list[str]:
+    """The JavaScript that draws figures beside a replay."""
+    return [plotly_script(), player_script(), template_text("report.js")]
 
 
 def plotly_script() -> str:
