@@ -35,7 +35,7 @@ __all__ = ["Leader", "LeaderConfig", "add_leader"]
 _PERIOD = 0.040
 """s between two decisions of the leader; its motors push in between too."""
 _RESPONSE = 0.010
-"""s, time constant with which the chassis takes on the motion that the wheels give it."""
+"""s, least time constant with which the chassis takes on the motion that the wheels give it."""
 _TRACTION = 6.0
 """N, greatest force of all wheels together on the chassis."""
 _TORQUE = 0.6
@@ -85,6 +85,8 @@ class Leader:
         self._place, self._speed = data.qpos[q : q + 3], data.qvel[v : v + 3]
         self._force = data.qfrc_applied[v : v + 3]
         self._every = max(1, round(_PERIOD / period))
+        # Forces hold for a period: a response as short as that would overshoot.
+        self._response = max(_RESPONSE, 2.0 * period)
         self._tracker = Tracker(_way(config.leader), _manner(self.robot))
         self.reset()
 
@@ -179,10 +181,10 @@ class Leader:
         cosine, sine = math.cos(yaw), math.sin(yaw)
         vx, vy, rate = self._speed.tolist()
         ahead, left, turn = self._twist
-        fx = MASS / _RESPONSE * (cosine * ahead - sine * left - vx)
-        fy = MASS / _RESPONSE * (sine * ahead + cosine * left - vy)
+        fx = MASS / self._response * (cosine * ahead - sine * left - vx)
+        fy = MASS / self._response * (sine * ahead + cosine * left - vy)
         share = min(1.0, _TRACTION / max(math.hypot(fx, fy), 1e-9))
-        torque = YAW_INERTIA / _RESPONSE * (turn - rate)
+        torque = YAW_INERTIA / self._response * (turn - rate)
         self._force[:] = fx * share, fy * share, max(-_TORQUE, min(_TORQUE, torque))
 
     def _show(self) -> None:
