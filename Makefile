@@ -12,6 +12,12 @@ PYTHON ?= $(shell for name in python3 python3.13 python3.12 python3.11; do \
 PEERS := .venv-peers
 ARGS ?=
 
+# What the simulated camera draws with: MuJoCo's pictures off the screen, on the processor.
+# OSMesa is one library; systems that do not have it any more have EGL.
+GRAPHICS := libosmesa6
+OTHER_GRAPHICS := libegl1 libopengl0 libgl1-mesa-dri
+CAN_DRAW = env -u MUJOCO_GL $(BIN)/python -c 'from bluefoot_mpc.sim.graphics import chosen_library; chosen_library()'
+
 # The matrices are small: threads of the linear algebra cost more than they bring.
 export OMP_NUM_THREADS ?= 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -46,6 +52,13 @@ $(STAMP): requirements.lock pyproject.toml
 	@echo "Installing into $(VENV) (about a minute) ..."
 	@$(BIN)/python -m pip install --quiet --require-hashes --only-binary :all: -r requirements.lock
 	@$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --no-index -e .
+	@$(CAN_DRAW) 2>/dev/null || { test "$$(id -u)" = 0 && command -v apt-get >/dev/null && { \
+		echo "Installing $(GRAPHICS), which the simulated camera needs ..."; \
+		apt-get update -qq && { apt-get install -y -qq --no-install-recommends $(GRAPHICS) || \
+		apt-get install -y -qq --no-install-recommends $(OTHER_GRAPHICS); }; } >&2; } || true
+	@$(CAN_DRAW) 2>/dev/null || { \
+		echo "Everything but the simulated camera works. Its pictures need OSMesa or EGL;"; \
+		echo "Debian and Ubuntu: apt install $(GRAPHICS)  (or: $(OTHER_GRAPHICS))"; } >&2
 	@touch $@
 
 walk: $(STAMP) ## the main job

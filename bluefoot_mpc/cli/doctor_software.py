@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 import sys
@@ -12,12 +11,15 @@ from bluefoot_mpc.codegen.compiler import CodegenUnavailable, find_compiler
 from bluefoot_mpc.codegen.config import CodegenConfig
 from bluefoot_mpc.io.findings import Finding, Severity
 from bluefoot_mpc.io.serial_link import available_ports
+from bluefoot_mpc.sim.graphics import MEND
 from bluefoot_mpc.tuning.identify import SYSID_NEEDS
 
 _OLDEST_PYTHON = (3, 11)
 _RENDER = (
-    "import mujoco; m = mujoco.MjModel.from_xml_string('<mujoco/>');"
-    "r = mujoco.Renderer(m, 8, 8); r.update_scene(mujoco.MjData(m)); print(r.render().shape)"
+    "from bluefoot_mpc.sim.graphics import chosen_library, graphics_context; import mujoco;"
+    "m = mujoco.MjModel.from_xml_string('<mujoco/>');"
+    "g = graphics_context(8, 8); r = mujoco.MjrContext(m, mujoco.mjtFontScale.mjFONTSCALE_100);"
+    "r.free(); g.free(); print(chosen_library())"
 )
 _RENDER_PATIENCE = 60.0
 _NAME = re.compile(r"^[A-Za-z0-9._-]+")
@@ -71,15 +73,11 @@ def _compiler() -> Finding:
 def _rendering() -> Finding:
     """One small picture, in a process of its own: a missing driver may end it."""
     part = "rendering"
-    environment = {"MUJOCO_GL": "egl", **os.environ}
-    mend = (
-        "Needed for pictures and the simulated camera alone. Install EGL (Debian: apt install libegl1 "
-        "libgl1-mesa-dri), or set MUJOCO_GL=osmesa with libosmesa6"
-    )
+    mend = f"Needed for pictures and the simulated camera alone. To have them, {MEND}"
     try:
         done = subprocess.run(
             [sys.executable, "-c", _RENDER], capture_output=True, text=True, check=False,
-            timeout=_RENDER_PATIENCE, env=environment,
+            timeout=_RENDER_PATIENCE,
         )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired) as error:
         return Finding(part=part, text=f"not tried: {error}", mend=mend, severity=Severity.NOTE)
@@ -88,7 +86,7 @@ def _rendering() -> Finding:
         return Finding(
             part=part, text=f"MuJoCo draws nothing: {last[:120]}", mend=mend, severity=Severity.NOTE
         )
-    return Finding(part=part, text=f"MuJoCo draws ({environment['MUJOCO_GL']})")
+    return Finding(part=part, text=f"MuJoCo draws ({done.stdout.strip()})")
 
 
 def _ports() -> Finding:

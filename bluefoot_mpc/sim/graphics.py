@@ -20,13 +20,14 @@ from bluefoot_mpc.exceptions import ConfigurationError
 VARIABLE = "MUJOCO_GL"
 """Environment variable that chooses the library, MuJoCo's own."""
 MEND = (
-    "install EGL (Debian and Ubuntu: apt install libegl1 libgl1-mesa-dri),"
-    " or OSMesa (apt install libosmesa6) where there is none"
+    "install OSMesa (Debian and Ubuntu: apt install libosmesa6),"
+    " or EGL where there is none (apt install libegl1 libopengl0 libgl1-mesa-dri)"
 )
 """Way out where nothing can draw."""
 
 _PLATFORM = "PYOPENGL_PLATFORM"
 _EGL_NAMES, _OSMESA_NAMES = ("libEGL.so.1", "libEGL.so"), ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")
+_OPENGL_NAMES = ("libOpenGL.so.0", "libGL.so.1", "libOpenGL.so", "libGL.so")
 _PLATFORM_DEVICE = 0x313F  # EGL_EXT_platform_device
 _MOST_DEVICES = 16
 
@@ -88,9 +89,9 @@ def _loads(names: tuple[str, ...]) -> ctypes.CDLL | None:
 
 
 def _egl_works() -> bool:
-    """Whether EGL has a device that it can draw on without a display."""
+    """Whether EGL has a device that it can draw on without a display, and PyOpenGL what it goes through."""
     egl = _loads(_EGL_NAMES)
-    if egl is None:
+    if egl is None or _loads(_OPENGL_NAMES) is None:
         return False
     query = _extension(egl, b"eglQueryDevicesEXT", ctypes.c_uint)
     display_of = _extension(egl, b"eglGetPlatformDisplayEXT", ctypes.c_void_p)
