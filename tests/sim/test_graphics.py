@@ -17,7 +17,8 @@ from bluefoot_mpc.model.robot import load_robot
 from bluefoot_mpc.sim.config import SimConfig
 from bluefoot_mpc.sim.robot import SimRobot
 from bluefoot_mpc.sim.sight_config import CameraConfig
-assert "MUJOCO_GL" in os.environ or not {{name for name in sys.modules if name == "cv2" or name.startswith("OpenGL")}}, "drawing at import"
+early = {{name for name in sys.modules if name == "cv2" or name.startswith("OpenGL")}}
+assert "MUJOCO_GL" in os.environ or not early, early
 robot = SimRobot(load_robot(), SimConfig(camera=CameraConfig(enabled=True), settle_time=0.02))
 print(robot._sight._camera.look().std() > 5.0, [n for n in ("egl", "osmesa") if "mujoco." + n in sys.modules])
 """
