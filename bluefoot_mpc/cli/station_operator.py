@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
+
+import numpy as np
 
 from bluefoot_mpc.cli.teleop import GAITS, Teleop, TeleopState, Vector3
 from bluefoot_mpc.io.station.ground import GroundLink
 from bluefoot_mpc.io.station.orders import Order
-from bluefoot_mpc.types import Mode, MotionCommand
+from bluefoot_mpc.io.station.picture import Mission
+from bluefoot_mpc.types import FloatArray, Guide, GuideTask, Mode, MotionCommand
 
 PAGE_TIMEOUT = 0.4
 """s; a page whose sticks are held says so ten times a second. One that is silent for longer has let go."""
@@ -19,6 +22,9 @@ HELP = (
     "P               STOP: end the gait, sit down, torque off\n"
     "0               torque off at once, wherever the robot is"
 )
+TASK_GONE = 1.5
+"""s after which a task that the robot does not speak of any more is over."""
+_TASKS = (GuideTask.WANDER, GuideTask.APPROACH, GuideTask.FOLLOW, GuideTask.GOTO)
 _MODES = {Order.STAND: Mode.STAND, Order.WALK: Mode.WALK, Order.SIT: Mode.SIT}
 _CENTRE: Vector3 = (0.0, 0.0, 0.0)
 
@@ -56,6 +62,33 @@ class _Held:
     time: float = 0.0
 
 
+@dataclass(slots=True)
+class Waypoints:
+    """The points that people have chosen on the map.
+
+    Attributes:
+        points: m forward and m to the left of where the run started.
+        done: points before those that the robot was sent to last.
+        sent: number of those.
+    """
+
+    points: list[tuple[float, float]] = field(default_factory=list)
+    done: int = 0
+    sent: int = 0
+
+    def reached(self, mission: Mission) -> int:
+        """Number of points that the robot has reached, by what it says of its list."""
+        return self.done + (mission.reached if mission.total == self.sent else 0)
+
+    def send(self, mission: Mission) -> FloatArray:
+        """(n, 2) m, the points that are left to go to; all of them once the last is reached."""
+        self.done = self.reached(mission)
+        if self.done >= len(self.points):
+            self.done = 0
+        self.sent = len(self.points) - self.done
+        return np.array(self.points[self.done :]).reshape(-1, 2)
+
+
 class Operator:
     """What the people at the station want, from wherever they say it.
 
@@ -79,12 +112,16 @@ class Operator:
         self._keyboard, self._gamepad = keyboard, gamepad
         self._held = _Held()
         self._start = link.clock.now()
+        self._waypoints = Waypoints()
+        self._task_seen: float | None = None
+        self._leader = 0
         self.state = TeleopState()
         self.ended = False
 
     def update(self) -> MotionCommand:
         """Read everything, and tell the robot."""
         now = self._now()
+        self._watch_task(now)
         sticks, buttons = self._gamepad.read() if self._gamepad is not None else (_CENTRE, [])
         keys = self._keyboard.read() if self._keyboard is not None else []
         if any(self._held.sticks) and now - self._held.time > PAGE_TIMEOUT:
@@ -107,8 +144,11 @@ class Operator:
         """A key of the keyboard, or a button of the gamepad."""
         if key in ORDER_KEYS:
             self.order(str(ORDER_KEYS[key]))
-        else:
-            self.state = self._teleop.press(self.state, key, self._now())
+            return
+        before = self.state.guide
+        self.state = self._teleop.press(self.state, key, self._now())
+        if self.state.guide is not before:
+            self._leader, self._task_seen = 0, None
 
     def sticks(self, page: int, values: Vector3) -> None:
         """A page's sticks; of several pages the one that moved last counts."""
@@ -135,16 +175,62 @@ class Operator:
         self._held = _Held()
         mode = _MODES.get(order, Mode.STAND)
         self.state = replace(
-            self.state, mode=mode, velocity=_CENTRE, stick=_CENTRE, last_input=now, ending=None
+            self.state, mode=mode, velocity=_CENTRE, stick=_CENTRE, guide=None, last_input=now, ending=None
         )
         # The sticks are centred before the order leaves.
         motion = self._teleop.command(self.state, now) or MotionCommand()
         self._link.order(order, motion)
 
     def gone(self, page: int) -> None:
-        """A page closed: its sticks are let go."""
+        """A page closed: its sticks are let go, and the task that it began is ended."""
         if self._held.page == page:
             self._held = _Held()
+        if self._leader == page and self.state.guide is not None:
+            self.order(str(Order.HALT))
+
+    def task(self, page: int, name: str) -> None:
+        """The robot is to find its own way; a name that is no task does nothing."""
+        if name not in _TASKS:
+            return
+        task = GuideTask(name)
+        if task is GuideTask.GOTO and not self._waypoints.points:
+            self._link.tell("no waypoint yet: click on the map, or tap it")
+            return
+        points = np.zeros((0, 2))
+        if task is GuideTask.GOTO:
+            points = self._link.look(lambda picture: self._waypoints.send(picture.mission))
+        self._held, self._leader, self._task_seen = _Held(), page, None
+        self.state = self._teleop.lead(self.state, Guide(task=task, waypoints=points), self._now())
+
+    def waypoint(self, forward: float, left: float) -> None:
+        """One more point to go to, m forward and m to the left of where the run started."""
+        most = self._link.config.waypoints_max
+        if len(self._waypoints.points) < most:
+            self._waypoints.points.append((forward, left))
+        else:
+            self._link.tell(f"the robot takes {most} waypoints at most: clear some")
+
+    def clear(self) -> None:
+        """No waypoints any more; a robot on its way to them stands."""
+        self._waypoints = Waypoints()
+        if self.state.guide is not None and self.state.guide.task is GuideTask.GOTO:
+            self.state = self._teleop.lead(self.state, None, self._now())
+        self._link.ask(Order.CLEAR)
+
+    def _watch_task(self, now: float) -> None:
+        """A task that the robot has ended, or never begun, is over here too."""
+        guide = self.state.guide
+        if guide is None:
+            self._task_seen = None
+            return
+        order, result = self._link.result()
+        refused = order == guide.task and result not in ("", "accepted", "replaced")
+        if self._link.look(lambda picture: picture.task) == guide.task:
+            self._task_seen = now
+        elif self._task_seen is not None and now - self._task_seen > TASK_GONE:
+            refused = True
+        if refused:
+            self.state = self._teleop.lead(self.state, None, now)
 
     def status(self) -> str:
         """One line on what is wanted now."""
@@ -155,7 +241,12 @@ class Operator:
         forward, left, turn = self._teleop.wanted(self.state)
         config = self._teleop.config
         order, result = self._link.result()
+        waypoints, guide = self._waypoints, self.state.guide
         return {
+            "task": "" if guide is None else str(guide.task),
+            "waypoints": waypoints.points,
+            "sent": waypoints.done + waypoints.sent,
+            "reached": self._link.look(lambda picture: waypoints.reached(picture.mission)),
             "mode": str(self.state.mode),
             "gait": self.state.gait,
             "velocity": [forward, left, turn],

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bluefoot_mpc.settings import require_positive
-from bluefoot_mpc.types import Mode, MotionCommand, TrunkPose
+from bluefoot_mpc.types import Guide, GuideTask, Mode, MotionCommand, TrunkPose
 
 GAITS = ("trot", "walk")
 HELP = (
@@ -17,6 +17,7 @@ HELP = (
     "G               trot or walk                   T                  sit down, stand up\n"
     "I/K J/L U/O     trunk: nose, side, heading     R/F                trunk: higher, lower\n"
     "C               trunk back to level            H                  these lines\n"
+    "V               wander on its own, or stop     B                  follow the marker, or stop\n"
     "X               sit down and end"
 )
 
@@ -32,6 +33,8 @@ _TILT: dict[str, Vector3] = {
 }  # fmt: skip
 """Steps of (roll, pitch, yaw) by key."""
 _HEIGHT = {"r": 1.0, "f": -1.0}
+_TASKS = {"v": GuideTask.WANDER, "b": GuideTask.FOLLOW}
+"""What the robot does on its own, by key; the same key again ends it."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -68,6 +71,7 @@ class TeleopState:
         gait: name of the gait.
         rpy: rad, offset of the trunk's attitude.
         height: m, offset of the trunk's height.
+        guide: what the robot finds its own way for; None while keys and sticks drive.
         last_input: s, when the operator last did something.
         ending: s, when the end was asked for; None while driving.
     """
@@ -78,6 +82,7 @@ class TeleopState:
     gait: str = GAITS[0]
     rpy: Vector3 = (0.0, 0.0, 0.0)
     height: float = 0.0
+    guide: Guide | None = None
     last_input: float = 0.0
     ending: float | None = None
 
@@ -105,7 +110,12 @@ class Teleop:
         if key == "x":
             return replace(_stopped(state), mode=Mode.SIT, ending=time)
         if key in _VELOCITY:
-            return replace(state, mode=Mode.WALK, velocity=self._faster(state.velocity, _VELOCITY[key]))
+            velocity = self._faster(state.velocity, _VELOCITY[key])
+            return replace(state, mode=Mode.WALK, velocity=velocity, guide=None)
+        if key in _TASKS:
+            task = _TASKS[key]
+            again = state.guide is not None and state.guide.task is task
+            return _stopped(state) if again else self.lead(state, Guide(task=task), time)
         if key in _TILT or key in _HEIGHT:
             return self._pose(state, key)
         return _SWITCHES[key](state) if key in _SWITCHES else state
@@ -120,10 +130,20 @@ class Teleop:
         effect = tuple(self._outside_dead_zone(value) for value in stick)
         x, y, turn = effect
         if any(effect):
+            still = (0.0, 0.0, 0.0)
             return replace(
-                state, mode=Mode.WALK, velocity=(0.0, 0.0, 0.0), stick=(x, y, turn), last_input=time
+                state, mode=Mode.WALK, velocity=still, stick=(x, y, turn), guide=None, last_input=time
             )
         return replace(_stopped(state), last_input=time) if any(state.stick) else state
+
+    def lead(self, state: TeleopState, guide: Guide | None, time: float) -> TeleopState:
+        """State after giving the robot a task, or taking it away; the next key or stick ends it."""
+        state = replace(_stopped(state), last_input=time)
+        return (
+            state
+            if guide is None or state.ending is not None
+            else replace(state, mode=Mode.WALK, guide=guide)
+        )
 
     def command(self, state: TeleopState, time: float) -> MotionCommand | None:
         """The command at a time: the operator's, what the dead man's handle leaves of it, or None to end."""
@@ -137,7 +157,9 @@ class Teleop:
                 mode = Mode.STAND
         pose = TrunkPose(position=np.array([0.0, 0.0, state.height]), rpy=np.array(state.rpy))
         velocity = np.array([forward, left])
-        return MotionCommand(mode=mode, velocity=velocity, yaw_rate=turn, gait=state.gait, trunk=pose)
+        return MotionCommand(
+            mode=mode, velocity=velocity, yaw_rate=turn, gait=state.gait, trunk=pose, guide=state.guide
+        )
 
     def wanted(self, state: TeleopState) -> Vector3:
         """Wanted m/s forward, m/s left and rad/s, sticks and keys together, within the bounds."""
@@ -154,6 +176,8 @@ class Teleop:
         remark = ""
         if state.ending is not None:
             remark = "  sitting down"
+        elif state.guide is not None:
+            remark = f"  {state.guide.task.value.upper()}: on its own"
         elif state.mode is Mode.WALK and self._is_stopped(state, time):
             forward = left = turn = 0.0
             remark = "  NO KEY: stopped"
@@ -166,8 +190,11 @@ class Teleop:
         )
 
     def _is_stopped(self, state: TeleopState, time: float) -> bool:
-        """True when the dead man's handle has acted: nobody gave a sign for too long."""
-        return time - state.last_input >= self.config.timeout
+        """True when the dead man's handle has acted: nobody gave a sign for too long.
+
+        A robot that finds its own way needs no hand at the handle.
+        """
+        return state.guide is None and time - state.last_input >= self.config.timeout
 
     def _faster(self, velocity: Vector3, step: Vector3) -> Vector3:
         sizes = (self.config.speed_step, self.config.speed_step, self.config.yaw_rate_step)
@@ -199,7 +226,7 @@ class Teleop:
 
 def _stopped(state: TeleopState) -> TeleopState:
     mode = Mode.STAND if state.mode is Mode.WALK else state.mode
-    return replace(state, mode=mode, velocity=(0.0, 0.0, 0.0), stick=(0.0, 0.0, 0.0))
+    return replace(state, mode=mode, velocity=(0.0, 0.0, 0.0), stick=(0.0, 0.0, 0.0), guide=None)
 
 
 def _other_gait(state: TeleopState) -> TeleopState:

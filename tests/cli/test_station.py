@@ -18,9 +18,11 @@ from bluefoot_mpc.cli.station_arguments import StationCommand
 from bluefoot_mpc.cli.station_operator import PAGE_TIMEOUT, Operator
 from bluefoot_mpc.cli.teleop import Teleop
 from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.io.station.config import StationConfig
 from bluefoot_mpc.io.station.link import StationLink
 from bluefoot_mpc.io.station.orders import Order
-from bluefoot_mpc.types import Mode
+from bluefoot_mpc.io.station.picture import Mission, RobotPicture
+from bluefoot_mpc.types import GuideTask, Mode
 
 pytestmark = pytest.mark.slow
 
@@ -37,7 +39,8 @@ class Link:
 
     def __init__(self):
         self.clock = Clock()
-        self.motion, self.orders = None, []
+        self.motion, self.orders, self.told = None, [], []
+        self.picture, self.config, self.answer = RobotPicture(), StationConfig(), ("", "")
 
     def steer(self, motion):
         self.motion = motion
@@ -46,8 +49,17 @@ class Link:
         self.orders.append(order)
         self.motion = motion
 
+    def ask(self, order):
+        self.orders.append(order)
+
+    def tell(self, text):
+        self.told.append(text)
+
+    def look(self, look):
+        return look(self.picture)
+
     def result(self):
-        return "", ""
+        return self.answer
 
 
 class Keys:
@@ -111,6 +123,114 @@ def test_orders_have_keys(desk, key, order):
     motion = desk.later()
     assert desk.link.orders == [order]
     assert not motion.velocity.any()
+
+
+@pytest.mark.parametrize(("key", "task"), [("v", GuideTask.WANDER), ("b", GuideTask.FOLLOW)])
+def test_tasks_have_keys_and_need_no_hand(desk, key, task):
+    desk.keys.typed = [key]
+    motion = desk.later()
+    assert (motion.mode, motion.guide.task) == (Mode.WALK, task)
+    # The same order all the time, far beyond the dead man's time.
+    assert desk.later(20.0).guide is motion.guide
+    desk.keys.typed = [key]
+    motion = desk.later()
+    assert (motion.mode, motion.guide) == (Mode.STAND, None)
+
+
+def test_a_hand_on_pad_keys_or_stick_ends_a_task(desk):
+    for move in ("key", "stick", "pad"):
+        desk.operator.task(3, "wander")
+        assert desk.later().guide.task is GuideTask.WANDER
+        if move == "key":
+            desk.keys.typed = ["w"]
+        desk.pad.sticks = (0.5 if move == "stick" else 0.0, 0.0, 0.0)
+        motion = desk.later(hold=(0.5, 0.0, 0.0) if move == "pad" else None)
+        assert (motion.mode, motion.guide) == (Mode.WALK, None), move
+        assert motion.velocity[0] > 0.0
+        desk.pad.sticks = (0.0, 0.0, 0.0)
+        desk.operator.gone(1)
+
+
+@pytest.mark.parametrize("order", [Order.STOP, Order.HALT, Order.SIT, Order.EMERGENCY])
+def test_orders_end_a_task(desk, order):
+    desk.operator.task(3, "follow")
+    desk.later()
+    desk.operator.order(str(order))
+    assert desk.later().guide is None
+    assert order in desk.link.orders
+
+
+def reached(desk, number, total, state=3):
+    desk.link.picture.task, desk.link.picture.mission = "goto", Mission(next=number, total=total, state=state)
+
+
+def test_waypoints_are_gone_to_and_those_reached_are_left_out_later(desk):
+    desk.operator.task(3, "goto")
+    assert desk.later().guide is None
+    assert "no waypoint" in desk.link.told[0]
+    for point in ((1.0, 0.0), (2.0, 1.0)):
+        desk.operator.waypoint(*point)
+    desk.operator.task(3, "goto")
+    assert desk.later().guide.waypoints.tolist() == [[1.0, 0.0], [2.0, 1.0]]
+    reached(desk, 1, 2)
+    desk.operator.waypoint(3.0, 3.0)
+    account = desk.operator.account()
+    assert (account["reached"], account["sent"], len(account["waypoints"])) == (1, 2, 3)
+    desk.operator.task(3, "goto")
+    assert desk.later().guide.waypoints.tolist() == [[2.0, 1.0], [3.0, 3.0]]
+    reached(desk, 1, 2, state=5)
+    assert desk.operator.account()["reached"] == 3
+    # From the first on, once all are reached.
+    desk.operator.task(3, "goto")
+    assert len(desk.later().guide.waypoints) == 3
+
+
+def test_clearing_ends_the_way(desk):
+    desk.operator.waypoint(1.0, 0.0)
+    desk.operator.task(3, "goto")
+    desk.later()
+    desk.operator.clear()
+    assert desk.later().guide is None
+    assert desk.link.orders == [Order.CLEAR]
+    assert desk.operator.account()["waypoints"] == []
+
+
+def test_what_the_robot_has_ended_is_over(desk):
+    desk.operator.task(3, "wander")
+    assert desk.later(5.0).guide is not None  # it has not begun yet
+    desk.link.picture.task = "wander"
+    assert desk.later(5.0).guide is not None
+    desk.link.picture.task = ""
+    assert desk.later(1.0).guide is not None
+    assert desk.later(1.0).guide is None
+
+
+def test_what_the_robot_refuses_is_over(desk):
+    desk.operator.task(3, "wander")
+    desk.link.answer = ("wander", "denied")
+    desk.later()
+    assert desk.later().guide is None
+
+
+def test_a_task_ends_with_the_page_that_began_it(desk):
+    desk.operator.task(3, "wander")
+    desk.operator.gone(4)
+    assert desk.later().guide is not None
+    desk.operator.gone(3)
+    assert desk.later().guide is None
+    assert desk.link.orders == [Order.HALT]
+    # One from the keyboard stays.
+    desk.keys.typed = ["v"]
+    desk.later()
+    desk.operator.gone(3)
+    assert desk.later().guide is not None
+
+
+def test_there_is_an_end_to_waypoints(desk):
+    for number in range(60):
+        desk.operator.waypoint(0.1 * number, 0.0)
+    assert len(desk.operator.account()["waypoints"]) == 50
+    assert "50" in desk.link.told[0]
 
 
 def test_a_page_drives_exactly_as_far_as_its_pad_is_moved(desk):

@@ -217,14 +217,14 @@ def test_waypoints_clicked_on_the_map_become_the_robots_way():
     async def go():
         async with whole_station() as (browser, robot, _):
             assert await browser.value("document.querySelector('[data-task=\"goto\"]').disabled")
-            for count, place in enumerate([(1.0, 0.5), (1.5, -0.5)], start=1):
+            for count, place in enumerate([(1.2, 1.5), (0.5, 1.8)], start=1):
                 await click_map(browser, *place)
                 await browser.wait_for(f"station.state.operator.waypoints.length === {count}")
             await browser.click('[data-task="goto"]')
             await until(lambda: motion(robot).guide is not None)
             guide = motion(robot).guide
             assert (motion(robot).mode, guide.task) == (Mode.WALK, GuideTask.GOTO)
-            assert guide.waypoints == pytest.approx(np.array([[1.0, 0.5], [1.5, -0.5]]), abs=0.03)
+            assert guide.waypoints == pytest.approx(np.array([[1.2, 1.5], [0.5, 1.8]]), abs=0.03)
             await browser.wait_for(f"{text('way')}.includes('waypoint: a wall')")
             assert "0.31 m clear" in await browser.value(text("way"))
             assert (await browser.value(text("mode"))) == "walk · goto"
@@ -245,9 +245,10 @@ def test_wandering_begins_and_ends_with_its_button_and_with_the_page():
     async def wander():
         async with whole_station() as (browser, robot, server):
             for ending in ("button", "page"):
+                await browser.wait_for("!document.querySelector('[data-task=\"wander\"].now')")
                 await browser.click('[data-task="wander"]')
                 await until(lambda: motion(robot).guide is not None)
-                await browser.wait_for("station.state.way.task === 'wander'")
+                await browser.wait_for("document.querySelector('[data-task=\"wander\"].now') !== null")
                 if ending == "button":
                     await browser.click('[data-task="wander"]')
                 else:

@@ -110,6 +110,12 @@ class GroundLink:
     Raises:
         ConfigurationError: the address or the key is wrong, or the log cannot be written.
         LinkError: the port cannot be opened.
+
+    Attributes:
+        config: addresses, rates and times, those of the address included.
+        clock: whose times count.
+        log: where everything is written down; None: nowhere.
+        name: of the link, for messages.
     """
 
     def __init__(
@@ -125,6 +131,7 @@ class GroundLink:
         if place.kind == "serial":
             config = replace(config, line_rate=place.number)
         signer = None if place.key is None else Signer(load_key(place.key))
+        self.config = config
         self.clock = clock or MonotonicClock()
         self.log = log
         self._lock = threading.Lock()

@@ -99,7 +99,7 @@ class GroundEnd:
     def _give(self, order: Order, stages: list[Any], now: float) -> None:
         # The last word counts: what has no answer yet is given up, a stop only for arming.
         for pending in self.orders:
-            if not pending.result and (order in FINAL or order is Order.ARM or pending.order not in FINAL):
+            if not pending.result and _replaces(order, pending.order):
                 pending.result = "replaced"
         self._ended = order in FINAL or (self._ended and order is not Order.ARM)
         if order is not Order.CLEAR:
@@ -168,6 +168,16 @@ class GroundEnd:
             for pending in self.orders:
                 if not pending.result and pending.take(message, now):
                     return
+
+
+def _replaces(order: Order, older: Order) -> bool:
+    """True where an order makes an older one without an answer pointless."""
+    lists = (Order.GOTO, Order.CLEAR)
+    if order in FINAL or order is Order.ARM:
+        return True
+    if order is Order.CLEAR or older is Order.CLEAR:  # which says nothing about motion
+        return order in lists and older in lists
+    return older not in FINAL
 
 
 def _heartbeat() -> Any:

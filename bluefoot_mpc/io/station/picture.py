@@ -61,9 +61,14 @@ class Mission:
     state: int = int(mavlink.MISSION_STATE_NO_MISSION)
 
     @property
+    def complete(self) -> bool:
+        """True once the last waypoint has been reached."""
+        return self.state == int(mavlink.MISSION_STATE_COMPLETE)
+
+    @property
     def reached(self) -> int:
         """Number of waypoints that have been reached."""
-        return self.total if self.state == mavlink.MISSION_STATE_COMPLETE else self.next
+        return self.total if self.complete else self.next
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

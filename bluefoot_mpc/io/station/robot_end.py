@@ -31,8 +31,8 @@ STREAMS = (
     Stream(name="system", rate=2.0),
     Stream(name="battery", rate=2.0),
     Stream(name="temperatures", rate=1.0),
-    Stream(name="mission", rate=1.0),
-    Stream(name="navigation", rate=1.0),
+    Stream(name="mission", rate=1.0, urgent=True),
+    Stream(name="navigation", rate=1.0, urgent=True),
 )
 """What goes down to the station."""
 _BUILD = {

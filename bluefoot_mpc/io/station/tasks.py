@@ -20,6 +20,8 @@ SPEED_MAX = 1.0
 """m/s; more is not asked for in earnest. What the robot really does is far below."""
 DISTANCE_MAX = 5.0
 """m."""
+NEAR = 0.3
+"""m; a waypoint that is passed from farther away was given up."""
 _DEFAULT = Guide(task=GuideTask.GOTO)
 _GROUND_SPEED = float(mavlink.SPEED_TYPE_GROUNDSPEED)
 _START = int(mavlink.MAV_CMD_MISSION_START)
@@ -90,7 +92,10 @@ class TaskBoard:
             self._first += done
 
     def progress(self, telemetry: Telemetry) -> list[int]:
-        """Waypoints (numbers in the list) reached since the last call; the last of them ends the task."""
+        """Waypoints (numbers in the list) reached since the last call; the end of the list ends the task.
+
+        Those that the robot gives up are passed, and not reached.
+        """
         guide, report, doing = self.guide, telemetry.navigation, telemetry.motion.guide
         if guide is None or report is None or doing is None or guide.task is not GuideTask.GOTO:
             return []
@@ -101,10 +106,12 @@ class TaskBoard:
         if report.guided is Guided.BLIND or (left == 0) != (report.guided is Guided.ARRIVED):
             return []
         before, self._left = self._left, min(self._left, max(0, left))
-        end = self._first + len(guide.waypoints)
+        count = len(guide.waypoints)
+        passed = range(count - before, count - self._left)
         if self._left == 0:
             self.guide = self._paused = None
-        return list(range(end - before, end - self._left))
+        away = np.hypot(*(guide.waypoints - telemetry.estimate.position[:2]).T)
+        return [self._first + number for number in passed if away[number] < NEAR]
 
     def current(self) -> tuple[int, int, int]:
         """(number of the waypoint that is next, number of waypoints, MISSION_STATE)."""
