@@ -29,9 +29,13 @@ from bluefoot_mpc.io.station.telemetry import Snapshot
 from bluefoot_mpc.types import (
     BodyState,
     GaitPhase,
+    Guide,
+    Guided,
+    GuideTask,
     ImuBatch,
     Mode,
     MotionCommand,
+    NavigationReport,
     PostureReference,
     SensorFrame,
     Telemetry,
@@ -54,6 +58,8 @@ def main() -> None:
     budgets = {
         "plain": budget(arguments.seconds),
         "signed, trunk tilted": budget(arguments.seconds, signed=True, tilted=True),
+        "on the way to waypoints": budget(arguments.seconds, guided=True),
+        "signed, on the way to waypoints": budget(arguments.seconds, signed=True, guided=True),
     }
     noise = noisy(arguments.frames, arguments.noise)
     if arguments.json:
@@ -62,8 +68,10 @@ def main() -> None:
         show(budgets, noise)
 
 
-def budget(seconds: float, *, signed: bool = False, tilted: bool = False) -> dict[str, Any]:
-    """Traffic by message, as pymavlink counts it."""
+def budget(
+    seconds: float, *, signed: bool = False, tilted: bool = False, guided: bool = False
+) -> dict[str, Any]:
+    """Traffic by message, as pymavlink counts it; a guided robot gets a new list of waypoints every 10 s."""
     config, rng = StationConfig(), np.random.default_rng(0)
     signers = [Signer(KEY, lambda: 1.8e9) if signed else None for _ in range(2)]
     robot, ground = RobotEnd(config, 0.0, signers[0]), GroundEnd(config, 0.0, signers[1])
@@ -72,7 +80,10 @@ def budget(seconds: float, *, signed: bool = False, tilted: bool = False) -> dic
     counted = {"down": Count(), "up": Count()}
     for tick in range(round((seconds + WARM_UP) / 0.02)):
         now = 0.02 * tick
-        robot.offer(snapshot(rng, now))
+        if guided and tick % 500 == 0:
+            way = Guide(task=GuideTask.GOTO, waypoints=rng.uniform(-5.0, 5.0, (10, 2)))
+            wish = MotionCommand(mode=Mode.WALK, guide=way)
+        robot.offer(snapshot(rng, now, robot.inbox.command(now)[0] if guided else None))
         ground.steer(wish, now)
         for way, end, other in (("down", robot, ground), ("up", ground, robot)):
             while data := end.produce(now):
@@ -143,8 +154,9 @@ def heartbeat() -> Any:
     return mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, mavlink.MAV_STATE_ACTIVE, 3)
 
 
-def snapshot(rng: np.random.Generator, time: float) -> Snapshot:
+def snapshot(rng: np.random.Generator, time: float, motion: MotionCommand | None = None) -> Snapshot:
     """A tick of a walking robot: numbers with no zeros at their ends, so that nothing is cut short."""
+    guide = None if motion is None else motion.guide
     rpy = 0.1 * rng.normal(size=3)
     imu = ImuBatch(
         time=np.array([time]), gyro=np.zeros((1, 3)), accel=np.zeros((1, 3)),
@@ -169,10 +181,23 @@ def snapshot(rng: np.random.Generator, time: float) -> Snapshot:
         trunk_position=np.zeros(3), trunk_rpy=np.zeros(3), foot_position=np.zeros((4, 3)), swing=phase.swing
     )
     telemetry = Telemetry(
-        time=time, mode=Mode.WALK, motion=MotionCommand(mode=Mode.WALK), estimate=estimate, phase=phase,
-        reference=reference, zmp=np.zeros(2), tick_us=5000.0,
+        time=time, mode=Mode.WALK, motion=motion or MotionCommand(mode=Mode.WALK), estimate=estimate,
+        phase=phase, reference=reference, zmp=np.zeros(2), tick_us=5000.0,
+        navigation=None if guide is None else report(rng, time, guide),
     )  # fmt: skip
     return Snapshot(telemetry=telemetry, frame=frame, state="active")
+
+
+def report(rng: np.random.Generator, time: float, guide: Guide) -> NavigationReport:
+    """A robot that gets stuck every other second, and is told so."""
+    stuck = int(time) % 2 == 1
+    return NavigationReport(
+        guided=Guided.ESCAPE if stuck else Guided.WAYPOINT, velocity=rng.normal(size=2), yaw_rate=0.1,
+        pitch=0.0, field=rng.normal(size=2), potential=0.1, mixing=0.0, marker=rng.normal(size=3),
+        marker_position=rng.normal(size=3), marker_age=1.3, clearance=rng.random(),
+        waypoints_left=len(guide.waypoints), scan_time=time,
+        reason="stuck: turning, backing off, stepping aside in turn" if stuck else "",
+    )  # fmt: skip
 
 
 def show(budgets: dict[str, Any], noise: dict[str, Any]) -> None:
