@@ -51,7 +51,9 @@ def world(command: WorldCommand) -> Outcome:
 
 def _describe(plan: WorldPlan, grid: Grid) -> list[str]:
     x0, y0, x1, y1 = plan.bounds
-    things = ", ".join(f"{count} {kind}" for kind, count in _things(plan).items())
+    things = ", ".join(
+        f"{count} {_plural(kind) if count > 1 else kind}" for kind, count in _things(plan).items()
+    )
     lines = [
         f"{plan.name}, seed {plan.seed}: {x1 - x0:.2f} m x {y1 - y0:.2f} m;"
         f" the robot starts {-x0:.2f} m from the back and {-y0:.2f} m from the right side",
@@ -71,3 +73,7 @@ def _things(plan: WorldPlan) -> Counter[str]:
 
 def _kind(name: str) -> str:
     return "wall" if name.startswith("wall") else re.sub(r"\d+$", "", name)
+
+
+def _plural(kind: str) -> str:
+    return f"{kind}es" if kind.endswith("x") else f"{kind}s"

@@ -26,8 +26,8 @@ def test_every_kind_is_told(capfd, kind):
 def test_page_tells_what_stands_where_and_how_to_go_there(capsys):
     assert main(["world", "chairs", "--seed", "1"]) == 0
     text = capsys.readouterr().out
-    assert "4 wall" in text
-    assert "1 table" in text
+    assert "4 walls" in text
+    assert "1 table," in text
     assert "bluefoot run wander --world chairs --seed 1" in text
     assert main(["world", "hidden"]) == 0
     text = capsys.readouterr().out

@@ -122,18 +122,23 @@ class Coverage:
             pose: (3,) m, m, rad: the LIDAR's place and direction in world.
             scan: what it measured there.
         """
-        if not scan.valid or not len(scan.bearing) or not len(self._left):
+        reach = np.fmin(scan.distance + self.grid.cell, LIDAR_RANGE)
+        reach[np.isnan(scan.distance)] = 0.0
+        if not scan.valid or not len(reach) or not len(self._left):
             return
         offset = self._points - pose[:2]
-        away = np.hypot(offset[:, 0], offset[:, 1])
-        bearing = np.arctan2(offset[:, 1], offset[:, 0]) - pose[2]
+        square = offset[:, 0] ** 2 + offset[:, 1] ** 2
+        near = np.flatnonzero(square <= float(reach.max()) ** 2)
+        bearing = np.arctan2(offset[near, 1], offset[near, 0]) - pose[2]
         bearing = (bearing + math.pi) % (2.0 * math.pi) - math.pi
         ray, spacing = _nearest_ray(scan.bearing, bearing)
-        with np.errstate(invalid="ignore"):
-            shown = away <= np.minimum(scan.distance[ray] + self.grid.cell, LIDAR_RANGE)
+        shown = square[near] <= reach[ray] ** 2
         shown &= np.abs(scan.bearing[ray] - bearing) <= spacing
-        self.seen.flat[self._left[shown]] = True
-        self._left, self._points = self._left[~shown], self._points[~shown]
+        seen = near[shown]
+        self.seen.flat[self._left[seen]] = True
+        left = np.ones(len(self._left), dtype=bool)
+        left[seen] = False
+        self._left, self._points = self._left[left], self._points[left]
 
 
 def seen_fraction(grid: Grid, poses: Iterable[FloatArray], scans: Iterable[LidarScan]) -> float:

@@ -70,9 +70,11 @@ def _standing(solid: Any) -> Any:
     """A solid's table; without a height above the floor it stands on it."""
     if not isinstance(solid, Mapping) or "z" in solid:
         return solid
-    size = solid.get("size")
-    is_size = isinstance(size, list) and len(size) == 3 and isinstance(size[2], (int, float))
-    return {**solid, "z": 0.5 * size[2] if is_size else 0.0}  # a wrong size is told later
+    height = 0.0  # what a wrong size takes; that is told later
+    match solid.get("size"):
+        case [_, _, float() | int() as value]:
+            height = value
+    return {**solid, "z": 0.5 * height}
 
 
 def _require_start(plan: WorldPlan) -> None:

@@ -1,5 +1,7 @@
 """Plans as files: there and back, and what is refused with cause and way out."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -87,6 +89,16 @@ def test_unknown_shape_is_told_with_the_valid_ones(tmp_path):
     file.write_text(SMALL.replace('"box"', '"ball"'))
     with pytest.raises(ConfigurationError, match="box, cylinder"):
         read_plan(file)
+
+
+def test_the_file_of_the_documentation_is_a_plan(tmp_path):
+    page = Path(__file__).parents[3] / "docs" / "worlds.md"
+    text = page.read_text(encoding="utf-8").split("```toml\n")[1].split("```")[0]
+    file = tmp_path / "example.toml"
+    file.write_text(text, encoding="utf-8")
+    plan = read_plan(file)
+    assert plan.marker == Marker(x=4.2, y=1.0)
+    assert plan.solids[0].z == pytest.approx(0.25)
 
 
 def test_a_file_that_is_not_there(tmp_path):
