@@ -106,8 +106,8 @@ class Escape:
         if start is None:
             return Motion()
         turned = abs(wrap_angle(pose.yaw - start.yaw))
-        away = math.dist(pose[:2], start[:2])
-        if turned > math.radians(config.enough_deg) or away > config.enough:
+        gone = math.dist(pose[:2], start[:2])
+        if turned > math.radians(config.enough_deg) or gone > config.enough:
             self._start = None
             return Motion()
         return self._phase(time - self._since, away)

@@ -13,7 +13,7 @@ from bluefoot_mpc.navigation.config import NavigationConfig
 from bluefoot_mpc.navigation.explore import Explorer
 from bluefoot_mpc.navigation.limits import Motion
 from bluefoot_mpc.navigation.marker_task import MarkerTask, MarkerWish
-from bluefoot_mpc.navigation.plan import GoalWay
+from bluefoot_mpc.navigation.plan import GoalWay, prepare
 from bluefoot_mpc.navigation.potential_field import Field, Pace, PotentialField
 from bluefoot_mpc.navigation.scan import LevelScan
 from bluefoot_mpc.navigation.surroundings import Surroundings
@@ -44,6 +44,7 @@ class Leading:
 
     def __init__(self, config: NavigationConfig, mounts: SensorMounts) -> None:
         self._config = config
+        prepare()
         self._potential = PotentialField(config.field)
         self._explorer = Explorer(config.explore, config.plan)
         self._goal_way = GoalWay(config.plan, every=0.5, tolerance=0.6)

@@ -50,6 +50,12 @@ class Ways(NamedTuple):
     room: FloatArray
 
 
+def prepare() -> None:
+    """Load what searches need: at the start, for it takes a third of a second the first time."""
+    import cv2  # noqa: F401, PLC0415 - heavy: not for who only reads a configuration
+    import scipy.sparse.csgraph  # noqa: F401, PLC0415
+
+
 def ways(grid: MapGrid, pose: Pose, config: PlanConfig, goal: FloatArray | None = None) -> Ways | None:
     """The cheapest ways from the robot; None where it is off the map.
 
