@@ -14,6 +14,8 @@ turning round and round whatever the way does."""
 
 _AHEAD = 0.20
 """m ahead of itself on the way that a steering leader drives to."""
+_TIGHTEST = 2.5
+"""1/m, greatest curvature that it steers; every kind of leader can turn like this."""
 _PULL = 1.0
 """1/s, how fast a leader that can move sideways comes back to its way, and turns to its heading."""
 _SWING = math.radians(35.0)
@@ -102,8 +104,12 @@ class Tracker:
         """Drive the arc through a point ahead on the way (pure pursuit)."""
         goal = self._way.at(self.distance + _AHEAD)
         dx, dy = goal.x - x, goal.y - y
-        left = dy * math.cos(yaw) - dx * math.sin(yaw)
-        return Twist(speed, 0.0, speed * 2.0 * left / max(dx * dx + dy * dy, 1e-4))
+        cosine, sine = math.cos(yaw), math.sin(yaw)
+        ahead, left = dx * cosine + dy * sine, dy * cosine - dx * sine
+        curvature = 2.0 * left / max(dx * dx + dy * dy, 1e-4)
+        if ahead < 0.0:
+            curvature = math.copysign(_TIGHTEST, left)  # somebody turned it round
+        return Twist(speed, 0.0, speed * max(-_TIGHTEST, min(_TIGHTEST, curvature)))
 
     def _glide(self, near: Point, left: float, yaw: float, speed: float) -> Twist:
         """Move along the way whatever the heading is, and hold the heading of the manner."""
