@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,9 @@ from bluefoot_mpc.sim.config import OPEN_WORLDS, PLANNED_WORLDS, WORLDS, WorldCo
 from bluefoot_mpc.sim.worlds import footprint
 from bluefoot_mpc.sim.worlds.coverage import LIDAR_HEIGHT, reachable, visible
 from bluefoot_mpc.sim.worlds.furniture import SEAT_HEIGHT
+from bluefoot_mpc.sim.worlds.hiding import is_hidden
 from bluefoot_mpc.sim.worlds.make import KINDS, make_plan, world_plan
+from bluefoot_mpc.sim.worlds.plan import Marker, Solid
 from bluefoot_mpc.sim.worlds.rooms import ARENA_FREE, NEAR_MARKER
 
 SEEDS = range(50)
@@ -143,6 +146,15 @@ def test_marker_is_hidden_from_the_start_and_can_be_reached():
         ]
         assert len(from_here) >= 20
         assert all(other.marker is None for other in (plan_of("room", seed), plan_of("arena", seed)))
+
+
+def test_what_stands_beside_the_line_hides_nothing():
+    marker = Marker(x=3.0, y=0.0)
+    screen = Solid(name="screen", shape="box", x=1.5, y=0.0, z=0.25, size=(0.1, 1.0, 0.5))
+    assert is_hidden([screen], marker)
+    assert not is_hidden([replace(screen, y=0.5)], marker)
+    assert not is_hidden([replace(screen, z=0.5, size=(0.1, 1.0, 0.5))], marker)
+    assert not is_hidden([], marker)
 
 
 def test_layout_seed_goes_before_the_run_s():
