@@ -21,6 +21,8 @@ LEAST_FILL = 0.25
 """Share of its box that a patch fills at least: less are thin lines and crumbs."""
 LEAST_PARTING = 12.0
 """Levels of saturation between two colours in one patch."""
+MOST_EDGES = 0.08
+"""Share of a patch that edges may take: Hough's transform of grain takes seconds and finds nothing."""
 HOUGH_CIRCLES = 3
 """Circles of Hough's transform that are examined in each channel."""
 TRIPLES = 48
@@ -236,6 +238,8 @@ def hough_circles(patch: Patch, least: float, greatest: float) -> Iterator[Circl
         return
     for channel in (1, 2, 0):
         smooth = cv2.GaussianBlur(patch.hsv[:, :, channel], (5, 5), 1.2)
+        if cv2.countNonZero(cv2.Canny(smooth, 12.0, 24.0)) > MOST_EDGES * smooth.size:
+            continue
         circles = cv2.HoughCircles(
             smooth, cv2.HOUGH_GRADIENT, dp=1.0, minDist=max(6.0, 0.5 * low), param1=24.0, param2=11.0,
             minRadius=low, maxRadius=high,
