@@ -203,13 +203,15 @@ class SimBody:
         flags = option.disableflags & ~_SENSORS_OFF
         quiet = flags | _SENSORS_OFF
         option.disableflags = quiet
-        period, count, leader = self._imu_steps, 0, self._leader
+        period, count, leader, is_close = self._imu_steps, 0, self._leader, self._truth.is_close
         for step in range(self._step + 1, self._step + steps + 1):
             if step > self._next_event:
                 self._handle_events(step - 1)
             advance()
             if step % period:
                 mj_step(model, data)
+                if is_close:
+                    self._truth.look_for_collisions()
                 continue
             option.disableflags = flags
             mj_step(model, data)

@@ -21,11 +21,16 @@ _PARTS = [slice(start, end) for start, end in itertools.pairwise(_ENDS)]
 """Where the parts of a sample lie in the result of `truth_function`."""
 
 
+_CLOSE = 0.15
+"""m; the fastest foot needs several frames for it."""
+
+
 class TruthReader:
     """Reads the state of the simulation without changing how it goes on.
 
     Attributes:
         power: W, mean electrical power of the last frame.
+        is_close: False where nothing but the floor was near in the last sample.
     """
 
     def __init__(self, world: World, ground: Ground, bank: ServoBank, foot_radius: float) -> None:
@@ -33,6 +38,7 @@ class TruthReader:
         self._world, self._ground, self._bank, self._radius = world, ground, bank, foot_radius
         self._touched: set[str] = set()
         self._surroundings = Surroundings(world.model, world.data, world.trunk)
+        self.is_close = self._surroundings.exist
         self._hit: set[str] = set()
         self._marker = mujoco.mj_name2id(world.model, mujoco.mjtObj.mjOBJ_GEOM, MARKER_GEOM)
         self._harmless = {geom for geom, name in enumerate(world.body_of_part) if not name}
@@ -57,7 +63,11 @@ class TruthReader:
             others = set(data.contact.geom.ravel().tolist()) - self._harmless
             self._touched.update(self._world.body_of_part[geom] for geom in others)
         if self._surroundings.exist:
-            self._hit.update(self._surroundings.touched())
+            self.look_for_collisions()
+
+    def look_for_collisions(self) -> None:
+        """Note what is no floor and touches the robot in this physics step."""
+        self._hit.update(self._surroundings.touched())
 
     def read(self, time: float, force: FloatArray) -> TruthSample:
         """The truth at the end of the last physics step; contact forces are that step's.
@@ -77,6 +87,8 @@ class TruthReader:
         feet = feet.reshape(N_LEGS, 3)
         if not self._ground.is_plane:
             heights = self._ground.clearance(feet, self._radius)
+        clearance = self._surroundings.clearance()
+        self.is_close = clearance < _CLOSE
         return TruthSample(
             time=time,
             q=q,
@@ -93,7 +105,7 @@ class TruthReader:
             voltage=float(bank.voltage[0]),
             touching=tuple(sorted(self._touched)) if self._touched else (),
             external_force=force.copy(),
-            clearance=self._surroundings.clearance(),
+            clearance=clearance,
             collisions=tuple(sorted(self._hit)) if self._hit else (),
             marker=data.geom_xpos[self._marker].copy() if self._marker >= 0 else np.full(3, np.nan),
         )

@@ -131,3 +131,19 @@ def test_standing_free_touches_nothing(robot_model):
     truth = stand(robot, robot_model)
     assert truth.collisions == truth.touching == ()
     assert truth.clearance > 0.3
+
+
+def test_touches_are_looked_for_in_every_step_where_things_are_close(robot_model):
+    robot = SimRobot(robot_model, SimConfig(world=WorldConfig(name="room")), seed=0)
+    reader = robot._truth
+    assert robot.truth().clearance > 0.15
+    assert not reader.is_close
+    front = robot.data.geom_xpos[:, 0][robot.model.geom_group == 3].max()
+    robot.data.qpos[0] += robot.plan.bounds[2] - front - 0.12
+    assert 0.0 < robot.truth().clearance < 0.15
+    assert reader.is_close
+    looks = []
+    reader.look_for_collisions = lambda: looks.append(1)
+    stand(robot, robot_model, 1)
+    assert len(looks) == 20
+    assert not SimRobot(robot_model, SimConfig())._truth.is_close
