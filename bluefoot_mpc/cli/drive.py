@@ -35,6 +35,11 @@ class Drive(Scenario):
     Config = DriveConfig
     config: DriveConfig
 
+    @property
+    def uses(self) -> tuple[str, ...]:
+        """It wanders by LIDAR. To follow it needs a camera too, which slows a simulator down."""
+        return ("lidar",)
+
     def command(self, time: float) -> MotionCommand:
         """Stand; the commands come from the operator, not from here."""
         return MotionCommand(gait=self.config.gait)

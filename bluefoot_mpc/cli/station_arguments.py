@@ -31,6 +31,12 @@ class StationCommand(Common):
     """Start a robot of this kind here, and end it with the station."""
     controller: Annotated[str | None, tyro.conf.arg(metavar="{cpg,mpc}", help_behavior_hint="")] = None
     """What decides in the robot that is started here."""
+    world: Annotated[str | None, tyro.conf.arg(metavar="NAME", help_behavior_hint="")] = None
+    """World of the robot that is started here: room, corridors, chairs ... (see: bluefoot run --help)."""
+    set: Annotated[
+        tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="SECTION.KEY=VALUE")
+    ] = ()
+    """One value of the configuration of the robot that is started here."""
     host: str = "127.0.0.1"
     """Interface to serve the page on; any but this machine's own adds a token to the address."""
     page_port: Annotated[int | None, tyro.conf.arg(metavar="PORT", help_behavior_hint="")] = None
@@ -51,6 +57,10 @@ class StationCommand(Common):
             raise ConfigurationError(f"--timeout = {self.timeout} must lie in 0..600 seconds, 0 excluded")
         if self.page_port is not None and not 1 <= self.page_port <= 65535:
             raise ConfigurationError(f"--page-port = {self.page_port} must lie in 1..65535")
+        if self.robot == "none" and (self.world is not None or self.set):
+            raise ConfigurationError(
+                "--world and --set are for a robot that is started here: add --robot sim"
+            )
         if self.robot != "none" and not self.connect.startswith("udpin:"):
             raise ConfigurationError(
                 f"--robot {self.robot} starts a robot that speaks over UDP: leave --connect out, "

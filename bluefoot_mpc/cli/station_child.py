@@ -32,6 +32,10 @@ class RobotProcess:
         self._words += ["--robot", command.robot, "--station", address]
         if command.controller is not None:
             self._words += ["--controller", command.controller]
+        if command.world is not None:
+            self._words += ["--world", command.world]
+        for override in command.set:
+            self._words += ["--set", override]
         self._process: subprocess.Popen[bytes] | None = None
         self._output: IO[bytes] | None = None
         self.start()

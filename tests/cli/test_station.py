@@ -322,6 +322,8 @@ def test_a_keyboard_that_is_gone_leaves_page_and_gamepad(desk):
         ({"timeout": 0.0}, "--timeout"),
         ({"page_port": 70000}, "--page-port"),
         ({"robot": "sim", "connect": "serial:/dev/ttyUSB0:57600"}, "leave --connect out"),
+        ({"world": "room"}, "add --robot sim"),
+        ({"set": ("sim.camera.enabled=true",)}, "add --robot sim"),
     ],
 )
 def test_wrong_options_are_refused(options, complaint):

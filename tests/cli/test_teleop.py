@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from bluefoot_mpc.cli.teleop import GAITS, HELP, Teleop, TeleopConfig, TeleopState
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.types import Mode
+from bluefoot_mpc.types import GuideTask, Mode
 
 TELEOP = Teleop()
 CONFIG = TELEOP.config
-KEYS = "wasdqeijklourfcgt xhz1"
+KEYS = "wasdqeijklourfcgtvb xhz1"
 
 
 def pressed(keys, time=0.0, state=None, teleop=TELEOP):
@@ -70,6 +70,45 @@ def test_space_stops_and_stands():
     assert motion.mode is Mode.STAND
     assert not motion.velocity.any()
     assert motion.yaw_rate == 0.0
+
+
+@pytest.mark.parametrize(("key", "task"), [("v", GuideTask.WANDER), ("b", GuideTask.FOLLOW)])
+def test_a_task_begins_and_ends_with_its_key(key, task):
+    motion = command(["w", key])
+    assert (motion.mode, motion.guide.task) == (Mode.WALK, task)
+    assert not motion.velocity.any()
+    motion = command(["w", key, key])
+    assert (motion.mode, motion.guide) == (Mode.STAND, None)
+
+
+def test_one_task_takes_the_place_of_the_other():
+    assert command(["v", "b"]).guide.task is GuideTask.FOLLOW
+
+
+@pytest.mark.parametrize("key", ["w", "q", "space", "t", "x"])
+def test_keys_that_move_end_a_task(key):
+    assert command(["v", key]).guide is None
+
+
+@pytest.mark.parametrize("key", ["i", "r", "c", "g", "h"])
+def test_other_keys_leave_a_task_alone(key):
+    assert command(["v", key]).guide is not None
+
+
+def test_a_task_needs_no_hand_at_the_handle():
+    state = pressed(["v"])
+    assert TELEOP.command(state, 600.0).guide is state.guide
+    assert "WANDER" in TELEOP.status(state, 600.0)
+    # And the key that comes after so long counts as it is.
+    assert TELEOP.press(state, "w", 600.0).velocity[0] == CONFIG.speed_step
+
+
+def test_a_stick_ends_a_task_at_once():
+    state = TELEOP.tilt_sticks(pressed(["v"]), (0.5, 0.0, 0.0), 1.0)
+    motion = TELEOP.command(state, 1.0)
+    assert motion.guide is None
+    assert motion.velocity[0] > 0.0
+    assert TELEOP.tilt_sticks(pressed(["v"]), (0.1, 0.0, 0.0), 1.0).guide is not None
 
 
 def test_gait_key_goes_around():
