@@ -19,9 +19,8 @@ from bluefoot_mpc.viz.plots_field import field_pictures, navigation_config
 from bluefoot_mpc.viz.plots_map import world_map
 from bluefoot_mpc.viz.plots_marker import distances, in_picture
 from bluefoot_mpc.viz.plots_way import way_over_time
-from bluefoot_mpc.viz.scans import cloud, read_scans
+from bluefoot_mpc.viz.scans import cloud, known_plan, read_scans
 from bluefoot_mpc.viz.series import RunSeries
-from bluefoot_mpc.viz.surroundings import plan_of
 
 _MOST_SCANS = 1500
 """Sweeps that the page looks at, spread over the run."""
@@ -64,7 +63,7 @@ def journey_of(run: RunData, series: RunSeries, robot: RobotModel) -> Journey | 
     guided = extract_guided(run, series, mounts)
     if guided is None:
         return None
-    plan, config = plan_of(run.config), navigation_config(run.config)
+    plan, config = known_plan(run, mounts), navigation_config(run.config)
     n = len(series.time)
     scans = read_scans(run, n, mounts, config.scan, most=_MOST_SCANS)
     pictures = kept_pictures(run)

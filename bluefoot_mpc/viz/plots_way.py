@@ -15,6 +15,8 @@ from bluefoot_mpc.viz.style import BAD, COMMAND, ESTIMATE, GUIDED_COLOURS, GUIDE
 
 LEAST_CLEARANCE = 0.10
 """m, nearest that any part of the robot may come to anything but the floor."""
+_MEAN = 0.6
+"""s over which achieved speeds are averaged: two cycles of a trot, whose sway would hide them."""
 _SHOWN = 1.5
 """m of clearance that the figure shows at least; farther things are of no concern."""
 
@@ -31,11 +33,13 @@ def way_over_time(series: RunSeries, guided: GuidedSeries, period: float) -> Pan
             traces.append(curve(guided.time, _near(values), name, colour, axis="y2", width=width))
     layout["yaxis2"]["range"] = [0.0, _top(guided)]
     achieved = "achieved" if series.has_truth else "achieved, as estimated"
+    achieved = f"{achieved} (mean of {_MEAN:g} s)"
     speed = series.velocity_truth if series.has_truth else series.velocity_estimate
+    count = max(1, round(_MEAN / period))
     shown = [
-        (achieved, 1e3 * speed[:, 0], "@ink", "y3", "solid", 1.1),
+        (achieved, 1e3 * smoothed(speed[:, 0], count), "@ink", "y3", "solid", 1.3),
         ("decided", 1e3 * guided.velocity[:, 0], COMMAND, "y3", "solid", 1.6),
-        (achieved, np.degrees(series.yaw_rate), "@ink", "y4", "solid", 1.1),
+        (achieved, np.degrees(smoothed(series.yaw_rate, count)), "@ink", "y4", "solid", 1.3),
         ("decided", np.degrees(guided.yaw_rate), COMMAND, "y4", "solid", 1.6),
     ]
     for name, values, colour, axis, dash, width in shown:
@@ -46,6 +50,14 @@ def way_over_time(series: RunSeries, guided: GuidedSeries, period: float) -> Pan
         key="way", title="Finding the way", data=traces, layout=layout, height=560, wide=True,
         caption=_caption(series, guided),
     )  # fmt: skip
+
+
+def smoothed(values: FloatArray, count: int) -> FloatArray:
+    """(n,) mean of `count` values around each; of fewer at the ends."""
+    window = np.ones(count)
+    number = np.convolve(np.ones(len(values)), window, mode="same")
+    mean = np.convolve(values, window, mode="same") / number
+    return np.asarray(mean[: len(values)])
 
 
 def _caption(series: RunSeries, guided: GuidedSeries) -> str:

@@ -66,6 +66,7 @@ def replay_html(run: RunData, robot: RobotModel) -> str:
         title=f"{named.get('scenario', 'run')}, seed {named.get('seed', '–')}",
         has_truth=series.has_truth,
         has_sweeps=bool(data.get("sweeps")),
+        has_room=bool(data.get("bounds")),
         plots_follow=bool(panels),
         panels=panels,
         strip=journey.strip if journey is not None else (),

@@ -21,6 +21,7 @@ from bluefoot_mpc.viz.series import RunSeries, extract
 from bluefoot_mpc.viz.stage_motion import replay_data
 from bluefoot_mpc.viz.style import BAD, NEUTRAL
 from bluefoot_mpc.viz.verdict import facts, number, tiles, verdict
+from bluefoot_mpc.viz.verdict_way import way_events, way_tiles
 
 SERVO_TEMPERATURE_LIMIT = 70.0
 """°C at which an AX-12A switches itself off (its control table's default)."""
@@ -68,10 +69,11 @@ def report_html(
         verdict=judged,
         facts=facts(summary),
         checks=checks,
-        tiles=tiles(summary, stall_torque, run.period, checks),
+        tiles=[*way_tiles(summary, checks), *tiles(summary, stall_torque, run.period, checks)],
         has_ticks=has_ticks,
         has_truth=series.has_truth,
         has_sweeps=bool(data.get("sweeps")),
+        has_room=bool(data.get("bounds")),
         plots_follow=True,
         panels=panels,
         strip=journey.strip if journey is not None else (),
@@ -85,7 +87,7 @@ def report_html(
         versions=sorted((summary.get("versions") or {}).items()),
         all_figures=_flat(summary),
         footer=_footer(series, len(run.telemetry)),
-        **_events(series),
+        **_events(series, way_events(run, journey.guided) if journey is not None else []),
     )
 
 
@@ -142,10 +144,10 @@ def _marks(series: RunSeries) -> list[dict[str, Any]]:
     return shapes
 
 
-def _events(series: RunSeries) -> dict[str, Any]:
+def _events(series: RunSeries, on_the_way: Sequence[tuple[float, str]]) -> dict[str, Any]:
     """Events with equal ones in a row put together, and a caption that tells what was left out."""
     grouped: list[dict[str, Any]] = []
-    for time, text in _with_pushes(series):
+    for time, text in sorted([*_with_pushes(series), *on_the_way], key=lambda event: event[0]):
         last = next((group for group in reversed(grouped[-4:]) if group["text"] == text), None)
         if last is not None and time - last["end"] < 0.5:
             last.update(end=time, count=last["count"] + 1)
@@ -156,7 +158,8 @@ def _events(series: RunSeries) -> dict[str, Any]:
         event["label"] = f"{event['time']:.2f} s"
         if event["count"] > 1:
             event["text"] += f" (for {event['end'] - event['time']:.2f} s, {event['count']} ticks)"
-    caption = "Changes of mode and gait, limits met and pushes; press a time to go there in the replay."
+    kinds = "mode, gait and what leads" if on_the_way else "mode and gait"
+    caption = f"Changes of {kinds}, limits met and pushes; press a time to go there in the replay."
     if not shown:
         caption = "Nothing out of the ordinary happened."
     elif len(grouped) > len(shown):

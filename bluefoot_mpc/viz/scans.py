@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +11,20 @@ from bluefoot_mpc.geometry import rotation_z
 from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.navigation.scan import LevelScan, ScanConfig, ScanReader
 from bluefoot_mpc.runtime.data import RunData
+from bluefoot_mpc.sim.worlds import footprint
+from bluefoot_mpc.sim.worlds.coverage import LIDAR_HEIGHT, lidar_pose
+from bluefoot_mpc.sim.worlds.plan import WorldPlan
 from bluefoot_mpc.types import FloatArray
+from bluefoot_mpc.viz.surroundings import plan_of
 
+_LOG = logging.getLogger(__name__)
+
+_LOOKS = 12
+"""Sweeps that are compared with a plan."""
+_NEAR, _NOISE, _FIT = 0.06, 0.015, 0.98
+"""m, m per metre of range, and share: so many points must lie so near to the plan's outlines."""
+_LEADER = 0.3
+"""m around marker and leader, which stand in no plan."""
 CELL = 0.03
 """m, side of the cells that thin a cloud of points out: one point in each."""
 
@@ -50,6 +63,53 @@ def read_scans(
         if not isinstance(scan, str):
             found.append(ReadScan(tick=k, scan=scan))
     return found
+
+
+def known_plan(run: RunData, mounts: SensorMounts) -> WorldPlan | None:
+    """The plan of the world that a run took place in; None where there is none, or it is no longer known.
+
+    Args:
+        run: the run.
+        mounts: where the LIDAR is.
+    """
+    plan = plan_of(run.config)
+    if plan is None or plan_fits(plan, run, mounts):
+        return plan
+    _LOG.info("the world '%s' was another one when the run was recorded: it is left out", plan.name)
+    return None
+
+
+def plan_fits(plan: WorldPlan, run: RunData, mounts: SensorMounts) -> bool:
+    """False where a run's own sweeps show that it took place elsewhere: another version makes other worlds.
+
+    Args:
+        plan: of the world that the configuration names today.
+        run: the run; without truth or sweeps nothing can be said.
+        mounts: where the LIDAR is.
+    """
+    ticks = [k for k, frame in enumerate(run.frames[: len(run.truth)]) if frame.lidar is not None]
+    pieces = [_ends(run, k, mounts) for k in ticks[:: max(1, -(-len(ticks) // _LOOKS))]]
+    table = np.concatenate([np.zeros((0, 3)), *pieces])
+    if not len(table):
+        return True
+    solids = footprint.crossing(plan.solids, LIDAR_HEIGHT)
+    away = np.abs(footprint.nearest(table[:, :2], solids))
+    return float(np.mean(away < _NEAR + _NOISE * table[:, 2])) > _FIT
+
+
+def _ends(run: RunData, tick: int, mounts: SensorMounts) -> FloatArray:
+    """(m, 3) m in world: x and y of what a sweep truly met but marker and leader, and how far away it was."""
+    truth, sweep = run.truth[tick], run.frames[tick].lidar
+    if sweep is None or not sweep.valid:
+        return np.zeros((0, 3))
+    x, y, yaw = lidar_pose(truth.q, np.asarray(mounts.lidar)).tolist()
+    met = np.isfinite(sweep.distance) & (sweep.distance > ScanConfig().least_range)
+    angle, away = yaw + sweep.bearing[met], sweep.distance[met]
+    points = np.column_stack([x + away * np.cos(angle), y + away * np.sin(angle), away])
+    for moving in (truth.marker, truth.leader):
+        if len(moving) and np.isfinite(moving[0]):
+            points = points[np.hypot(*(points[:, :2] - moving[:2]).T) > _LEADER]
+    return points
 
 
 def cloud(run: RunData, scans: list[ReadScan], most: int) -> FloatArray:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.types import FloatArray, LidarScan
 from bluefoot_mpc.viz.animation import animation_data
 from bluefoot_mpc.viz.packing import pack, stride_for
+from bluefoot_mpc.viz.scans import known_plan
 from bluefoot_mpc.viz.scene import build_scene
 from bluefoot_mpc.viz.series import RunSeries
 from bluefoot_mpc.viz.stage import Stage, stage_data, stage_of, wheel_angles, wheel_steering
@@ -36,21 +37,21 @@ def replay_data(run: RunData, series: RunSeries, robot: RobotModel) -> dict[str,
     """
     parameters = robot.parameters
     data = animation_data(build_scene(robot), series, parameters.legs.foot_radius)
-    return data | moving_data(run, series, parameters.sensors.lidar)
+    return data | moving_data(run, series, parameters.sensors)
 
 
-def moving_data(run: RunData, series: RunSeries, mount: Sequence[float]) -> dict[str, Any]:
+def moving_data(run: RunData, series: RunSeries, mounts: SensorMounts) -> dict[str, Any]:
     """Surroundings, leader and sweeps of a run, ready for JSON; empty for a run on open floor without any.
 
     Args:
         run: the run.
         series: its time series.
-        mount: (3,) m, the LIDAR in the base frame.
+        mounts: where the sensors are.
     """
+    moves = any(np.isfinite(sample.leader[:1]).any() for sample in run.truth[:1])
     stage = stage_of(run.config)
-    if not any(np.isfinite(sample.leader[:1]).any() for sample in run.truth[:1]):
-        stage = replace(stage, leader="")
-    sweeps = _sweeps(run, series, mount)
+    stage = Stage(plan=known_plan(run, mounts), leader=stage.leader if moves else "")
+    sweeps = _sweeps(run, series, mounts.lidar)
     if stage == Stage() and sweeps is None:
         return {}
     data = stage_data(stage)

@@ -21,6 +21,10 @@ _DID = {
     "push": "withstood the push",
     "drive": "was driven",
     "level": "levelled its trunk",
+    "wander": "wandered",
+    "goto": "went to its waypoints",
+    "approach": "approached the marker",
+    "follow": "followed the leader",
 }
 
 
@@ -272,6 +276,9 @@ def _tile(
 
 
 def _extent(summary: Mapping[str, Any]) -> str:
+    path = (summary.get("figures") or {}).get("path_m")
+    if path is not None:
+        return f" over {number(path, 1)} m in {number(summary.get('duration_s'), 0)} s"
     distance, speed = summary.get("distance_m"), summary.get("speed_mps")
     if not summary.get("speed_ref_mps") or distance is None or speed is None:
         return f" for {number(summary.get('duration_s'), 0)} s"

@@ -9,7 +9,7 @@ from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.sim.worlds import footprint
 from bluefoot_mpc.viz.guided_series import GuidedSeries, extract_guided
-from bluefoot_mpc.viz.scans import CELL, cloud, read_scans
+from bluefoot_mpc.viz.scans import CELL, cloud, known_plan, plan_fits, read_scans
 from bluefoot_mpc.viz.series import extract
 
 from . import navigating_run as made
@@ -113,3 +113,16 @@ def test_sweeps_are_thinned_and_useless_ones_left_out(guided_run: RunData, robot
 @pytest.fixture(scope="module")
 def blind_run(robot: RobotModel) -> RunData:
     return navigating_run(robot, duration=8.0, truth=False)
+
+
+def test_a_plan_is_believed_only_where_the_sweeps_agree(guided_run: RunData, robot: RobotModel) -> None:
+    mounts = robot.parameters.sensors
+    assert known_plan(guided_run, mounts) == made.room()
+    round_ones = [s for s in made.room().solids if s.shape == "cylinder"]
+    thing = min(round_ones, key=lambda s: np.hypot(s.x, s.y) - 0.5 * s.size[0])
+    moved = tuple(
+        dataclasses.replace(s, x=s.x + 0.5) if s.name == thing.name else s for s in made.room().solids
+    )
+    assert not plan_fits(dataclasses.replace(made.room(), solids=moved), guided_run, mounts)
+    config = {**guided_run.config, "sim": {"world": {"name": "gone.toml"}}}
+    assert known_plan(dataclasses.replace(guided_run, config=config), mounts) is None

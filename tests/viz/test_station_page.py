@@ -225,7 +225,7 @@ def test_waypoints_clicked_on_the_map_become_the_robots_way():
             guide = motion(robot).guide
             assert (motion(robot).mode, guide.task) == (Mode.WALK, GuideTask.GOTO)
             assert guide.waypoints == pytest.approx(np.array([[1.2, 1.5], [0.5, 1.8]]), abs=0.03)
-            await browser.wait_for(f"{text('way')}.includes('waypoint: a wall')")
+            await browser.wait_for(f"{text('way')}.includes('to waypoint 1 · a wall')")
             assert "0.31 m clear" in await browser.value(text("way"))
             assert (await browser.value(text("mode"))) == "walk · goto"
             # A hand on the keys has priority, at once.

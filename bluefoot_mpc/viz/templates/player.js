@@ -138,9 +138,9 @@ class View3D {
     const sun = this.sun = new T.DirectionalLight(0xfff1df, 0.72);
     sun.castShadow = true;
     sun.shadow.mapSize.set(2048, 2048);
-    const half = this.room ? 2 : 0.45;  // m; tall things far away throw shadows too
-    Object.assign(sun.shadow.camera, { left: -half, right: half, top: half, bottom: -half, near: 0.2, far: this.room ? 9 : 4 });
-    sun.shadow.bias = -0.0006;
+    const half = this.room ? 0.75 * this.roomSize() : 0.45;  // m; in a room all of it throws shadows
+    Object.assign(sun.shadow.camera, { left: -half, right: half, top: half, bottom: -half, near: 0.2, far: this.room ? 4 * half : 4 });
+    sun.shadow.bias = this.room ? -0.002 : -0.0006;
     sun.shadow.radius = 5;
     viewer.scene.add(sun, sun.target);
     const rim = new T.DirectionalLight(0xcfe2ff, 0.28);
@@ -166,6 +166,17 @@ class View3D {
     viewer.camera.fov = 33;
     viewer.camera.near = 0.02;
     this.theme();
+  }
+  roomSize() { const [x0, y0, x1, y1] = this.room; return Math.max(x1 - x0, y1 - y0); }
+  // The sun follows the robot; in a room it stands over its middle.
+  light(x, y, z) {
+    let far = 1;
+    if (this.room) {
+      x = (this.room[0] + this.room[2]) / 2; y = (this.room[1] + this.room[3]) / 2;
+      far = 0.9 * this.roomSize();
+    }
+    this.sun.target.position.set(x, y, z);
+    this.sun.position.set(x + 0.5 * far, y - 0.55 * far, z + 1.6 * far);
   }
   theme() {
     const T = MeshCat.THREE, css = getComputedStyle(this.pane);
@@ -311,9 +322,7 @@ class View3D {
       }
     }
     const z = this.rec.groundHeight(trunk[0], trunk[1]);
-    this.sun.target.position.set(trunk[0], trunk[1], z);
-    const up = this.room ? 2.5 : 1;
-    this.sun.position.set(trunk[0] + 0.5 * up, trunk[1] - 0.55 * up, z + 1.6 * up);
+    this.light(trunk[0], trunk[1], z);
     // The floor moves by whole tiles, so that it seems to be endless and at rest.
     const fx = 0.2 * Math.round(trunk[0] / 0.2), fy = 0.2 * Math.round(trunk[1] / 0.2);
     this.floor.position.set(fx, fy, this.rec.groundHeight(fx, fy));

@@ -41,9 +41,12 @@ class WayMap {
   tell() {
     const { way, operator } = this.state, task = way.task || operator.task;
     const age = way.markerAge, clear = way.clearance;
-    const words = { goto: "to the waypoints", wander: "wandering", follow: "following", approach: "approaching" };
+    const number = operator.task === "goto" && operator.reached < operator.sent ? ` ${operator.reached + 1}` : "s";
+    const words = { goto: `to waypoint${number}`, wander: "wandering", follow: "following", approach: "to the marker" };
     const parts = task ? [words[task] || task] : ["click or tap to set waypoints"];
-    if (way.lead) parts.push(way.lead + (way.why ? `: ${way.why}` : ""));
+    const usual = { goto: "waypoint", wander: "field", follow: "marker", approach: "marker" };
+    const lead = way.lead === usual[task] ? [] : [way.lead];
+    if (way.lead) parts.push(...[...lead, way.why].filter(Boolean));
     if (clear !== null && way.lead) parts.push(`${clear.toFixed(2)} m clear`);
     if (["follow", "approach"].includes(task) && age !== null && age > 1) parts.push(`marker seen ${age.toFixed(0)} s ago`);
     const text = parts.join(" · ");

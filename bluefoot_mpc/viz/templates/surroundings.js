@@ -71,7 +71,7 @@ class SweepView {
     this.bearing = unpack(data.bearing);
     this.time = data.time ? unpack(data.time) : null;
     this.distance = data.distance ? new Uint16Array(unpack(data.distance).buffer) : null;
-    this.points = new T.Points(new T.BufferGeometry(), new T.PointsMaterial({ color: 0xd1495b, size: 0.03 }));
+    this.points = new T.Points(new T.BufferGeometry(), new T.PointsMaterial({ color: 0xe03a4e, size: 4, sizeAttenuation: false }));
     this.points.geometry.setAttribute("position", new T.BufferAttribute(new Float32Array(3 * this.bearing.length), 3));
     this.points.frustumCulled = false;
     this.points.visible = false;
@@ -83,8 +83,8 @@ class SweepView {
     const turn = new T.Quaternion(pose[3], pose[4], pose[5], pose[6]), point = new T.Vector3(), [x, y, z] = this.mount;
     let n = 0;
     this.bearing.forEach((bearing, k) => {
-      const away = millimetres[k] / 1000;
-      if (!(away > 0.02)) return;
+      const away = millimetres[k] / 1000 - 0.02;  // m; shown a little before what they met, or it would hide them
+      if (!(away > 0.05)) return;
       point.set(x + away * Math.cos(bearing), y + away * Math.sin(bearing), z).applyQuaternion(turn);
       position.setXYZ(n++, pose[0] + point.x, pose[1] + point.y, pose[2] + point.z);
     });
