@@ -116,11 +116,13 @@ class MarkerFinder:
         """Why the last picture gave no sighting; empty where it gave one."""
         return self._reason
 
-    def find(self, image: CameraImage | None) -> Sighting | None:
+    def find(self, image: CameraImage | None, expected: Circle | None = None) -> Sighting | None:
         """Look for the marker.
 
         Args:
             image: a picture of any size; None, an invalid, grey, empty or otherwise wrong one gives None.
+            expected: column, row, radius (px) where it should be, if that is known: a good fit there ends
+                the search at once, which saves time and is not led astray by a wall of its colour.
         """
         self._reason = _fault(image)
         if image is None or self._reason:
@@ -128,20 +130,41 @@ class MarkerFinder:
         pixels = np.ascontiguousarray(image.pixels)
         height, width = pixels.shape[:2]
         lens = Lens(focal=0.5 * width / self._half_view, column=0.5 * width, row=0.5 * height)
-        best: Cone | None = None
-        blobs = marker_colour.blobs(pixels, self._colour, self._config.candidates, self._least_radius(width))
-        for blob in blobs:
-            found = self._examine(pixels, blob, lens)
-            if found is not None and (best is None or found.score > best.score):
-                best = found
+        best = self._near(pixels, expected, lens)
         if best is None:
-            self._reason = "no round patch of the marker's colour" if blobs else "nothing of its colour"
+            best = self._anywhere(pixels, lens)
+        if best is None:
             return None
         column, row = lens.project(best.axis)
         return Sighting(
             time=image.time, column=column, row=row, radius=lens.focal * math.tan(best.angle),
             width=width, height=height, focal=lens.focal, arc=best.arc, support=best.support,
         )  # fmt: skip
+
+    def _near(self, pixels: Any, expected: Circle | None, lens: Lens) -> Cone | None:
+        """The ball where it is expected, if it is there beyond doubt."""
+        limits = self._limits(pixels.shape)
+        if expected is None or not limits.least_radius < expected[2] < limits.greatest_radius:
+            return None
+        if not (0.0 < expected[0] < pixels.shape[1] and 0.0 < expected[1] < pixels.shape[0]):
+            return None
+        patch = marker_colour.cut_around(pixels, expected, self._colour)
+        cone = marker_edge.measure(patch, expected, lens, limits)
+        return cone if cone is not None and cone.support > PLAIN and cone.arc > PLAIN else None
+
+    def _anywhere(self, pixels: Any, lens: Lens) -> Cone | None:
+        """The best ball in any patch of the colour."""
+        best: Cone | None = None
+        blobs = marker_colour.blobs(
+            pixels, self._colour, self._config.candidates, self._least_radius(pixels.shape[1])
+        )
+        for blob in blobs:
+            found = self._examine(pixels, blob, lens)
+            if found is not None and (best is None or found.score > best.score):
+                best = found
+        if best is None:
+            self._reason = "no round patch of the marker's colour" if blobs else "nothing of its colour"
+        return best
 
     def _least_radius(self, width: int) -> float:
         return max(2.5, self._config.least_radius * width / 640.0)

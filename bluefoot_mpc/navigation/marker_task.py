@@ -80,6 +80,7 @@ class MarkerTask:
         self._finder = MarkerFinder(config.finder, mounts.camera_view_deg)
         self._target = Target(config.target, mounts)
         self._search = Search(config.search)
+        self._mounts = mounts
         self._ball_focal = config.target.marker_radius * mounts.focal_length(640)  # m px
         self._camera_ahead = mounts.camera[0]
         self.reset()
@@ -116,11 +117,19 @@ class MarkerTask:
         return self._seek(estimate)
 
     def _look(self, image: CameraImage) -> None:
-        self._sighting = self._finder.find(image)
+        self._sighting = self._finder.find(image, self._expected(image))
         self._reason = self._finder.reason
         if self._sighting is not None and not self._target.see(self._sighting):
             self._sighting = None
             self._reason = "a marker is seen, but not where it can be"
+
+    def _expected(self, image: CameraImage) -> tuple[float, float, float] | None:
+        """Where in a picture the marker should be; None where the picture has no size or nothing is known."""
+        shape: tuple[int, ...] = getattr(image.pixels, "shape", ())
+        if len(shape) < 2 or not math.isfinite(image.time):
+            return None
+        height, width = int(shape[0]), int(shape[1])
+        return self._target.expected(image.time, self._mounts.focal_length(width), (width, height))
 
     def _lead(self, guide: Guide, estimate: BodyState) -> MarkerWish:
         """The marker is in view: towards it, or stand."""

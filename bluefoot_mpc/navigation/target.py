@@ -148,6 +148,28 @@ class Target:
             quaternion / np.linalg.norm(quaternion),
         )  # fmt: skip
 
+    def expected(self, time: float, focal: float, size: tuple[int, int]) -> tuple[float, float, float] | None:
+        """Where in a picture the marker should be; None where that is not known well enough.
+
+        Args:
+            time: s, of the picture's exposure.
+            focal: px, of the picture.
+            size: px, its width and height.
+
+        Returns:
+            Column, row and radius as in a `Sighting`.
+        """
+        pose = self.pose_at(time)
+        if pose is None or not self.trusted(time):
+            return None
+        rotation = rotation_from_quaternion(pose.quaternion)
+        x, y, z = (rotation.T @ (self.position_at(time) - pose.position) - self._camera).tolist()
+        far = math.hypot(x, y, z)
+        if x < 0.1 or far <= self._config.marker_radius:
+            return None
+        radius = focal * math.tan(math.asin(self._config.marker_radius / far))
+        return 0.5 * size[0] - focal * y / x, 0.5 * size[1] - focal * z / x, radius
+
     def fix(self, sighting: Sighting) -> Fix | None:
         """Where a sighting puts the marker; None where the pose at its time is not known any more."""
         pose = self.pose_at(sighting.time)
