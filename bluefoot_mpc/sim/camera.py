@@ -78,8 +78,9 @@ class RenderedCamera:
         self._rectangle = mujoco.MjrRect(0, 0, config.width, config.height)
         self._drawn = np.empty((config.height, config.width, 3), dtype=np.uint8)
         self._graphics = graphics_context(config.width, config.height)
-        self._renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._renderer)
+        with self._graphics.as_current():
+            self._renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+            mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._renderer)
         self._freed = weakref.finalize(self, _free, self._graphics, self._renderer)
         # The graphics library ends itself at exit, and wants everything back before; the last goes first.
         self._freed.atexit = False
@@ -109,8 +110,6 @@ class RenderedCamera:
         """
         if not self._freed.alive:
             raise RuntimeError("the camera is closed")
-        # Somebody else may have drawn since.
-        self._graphics.make_current()
         everything = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(
             self._model, self._data, self._option, None, self._view, everything, self._scene
@@ -118,8 +117,9 @@ class RenderedCamera:
         self._aim()
         # The light at the camera, where the camera is now.
         mujoco.mjv_makeLights(self._model, self._data, self._scene)
-        mujoco.mjr_render(self._rectangle, self._scene, self._renderer)
-        mujoco.mjr_readPixels(self._drawn, None, self._rectangle, self._renderer)
+        with self._graphics.as_current():
+            mujoco.mjr_render(self._rectangle, self._scene, self._renderer)
+            mujoco.mjr_readPixels(self._drawn, None, self._rectangle, self._renderer)
         # The graphics library counts rows from below.
         upright: NDArray[np.uint8] = self._cv2.flip(self._drawn, 0)
         return upright
@@ -141,6 +141,6 @@ class RenderedCamera:
 
 
 def _free(graphics: Any, renderer: mujoco.MjrContext) -> None:
-    graphics.make_current()
-    renderer.free()
+    with graphics.as_current():
+        renderer.free()
     graphics.free()

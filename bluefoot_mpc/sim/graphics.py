@@ -33,7 +33,7 @@ _MOST_DEVICES = 16
 
 
 def graphics_context(width: int, height: int) -> Any:
-    """MuJoCo's context for drawing off the screen, made current.
+    """MuJoCo's context for drawing off the screen; to be made current where it is used, in any thread.
 
     Args:
         width: pixels of the largest picture.
@@ -48,7 +48,8 @@ def graphics_context(width: int, height: int) -> Any:
         os.environ[_PLATFORM] = name
     try:
         context = importlib.import_module(f"mujoco.{name}").GLContext(width, height)
-        context.make_current()
+        with context.as_current():
+            pass
     except (ImportError, AttributeError, OSError, RuntimeError) as error:
         raise ConfigurationError(
             f"no pictures can be drawn with '{name}' ({error}). To have a camera, {MEND};"

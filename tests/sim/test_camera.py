@@ -1,4 +1,5 @@
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import mujoco
 import numpy as np
@@ -184,3 +185,15 @@ def test_other_sizes(world, robot, size):
 def test_impossible_cameras_are_refused(changes, message):
     with pytest.raises(ConfigurationError, match=message):
         CameraConfig(**changes)
+
+
+def test_pictures_can_be_taken_in_another_thread(world, robot, lens):
+    """A robot may be made in one thread and stepped, or left to the garbage, in another."""
+    place(world)
+    here = lens.look()
+    with ThreadPoolExecutor(1) as pool:
+        there = pool.submit(lens.look).result()
+        other = pool.submit(make, world, robot).result()
+        pool.submit(other.close).result()
+    np.testing.assert_array_equal(here, there)
+    np.testing.assert_array_equal(lens.look(), here)
