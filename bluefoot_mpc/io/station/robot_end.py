@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections import deque
 from typing import Any
@@ -45,7 +44,7 @@ _BUILD = {
 }
 _ALIVE = 0.3  # s, age of a command that still counts as a working uplink
 _REPEAT = 5.0  # s in which the same text is told once
-_LED_PERIOD = 0.5  # s between two words on what leads the robot
+_STEADY = 0.3  # s for which something leads the robot until that is told
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 _ARM = int(mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
 
@@ -85,7 +84,8 @@ class RobotEnd:
         self._guards: dict[int, SequenceGuard] = {}
         self._shown = 0
         self._seen: Snapshot | None = None
-        self._led, self._led_told = "", -math.inf
+        self._led = self._led_now = ""
+        self._led_since = now
         self._has_list = False
         self._current = self.inbox.tasks.current()
         self.mission = MissionServer(
@@ -188,8 +188,10 @@ class RobotEnd:
         led = tell.led(snapshot)
         # Another number in the same words is nothing new.
         words = _NUMBER.sub("#", led)
-        if words != self._led and now - self._led_told >= _LED_PERIOD:
-            self._led, self._led_told = words, now
+        if words != self._led_now:
+            self._led_now, self._led_since = words, now
+        if words != self._led and now - self._led_since >= _STEADY:
+            self._led = words
             self._schedule.hurry("navigation", now)
             if led:
                 self.say(mavlink.MAV_SEVERITY_INFO, f"{tell.NAVIGATION_TEXT}{led}")

@@ -20,6 +20,9 @@ class Controls {
     for (const name of ["blur", "pagehide"]) window.addEventListener(name, () => this.release());
     document.addEventListener("visibilitychange", () => { if (document.hidden) this.release(); });
     setInterval(() => this.tell(), 50);
+    // On a small screen STOP stays in reach when its button has scrolled away.
+    const [stop, near] = root.querySelectorAll(".stop");
+    new IntersectionObserver(([seen]) => { near.hidden = seen.isIntersecting; }).observe(stop);
   }
   order(name) { this.release(); this.say({ order: name }); }
   tilt() { this.say({ trunk: this.trunk.map((slider) => slider.value / 100) }); }
