@@ -19,7 +19,8 @@ _RENDER = (
     "from bluefoot_mpc.sim.graphics import chosen_library, graphics_context; import mujoco;"
     "m = mujoco.MjModel.from_xml_string('<mujoco/>');"
     "g = graphics_context(8, 8); g.make_current();"
-    "r = mujoco.MjrContext(m, mujoco.mjtFontScale.mjFONTSCALE_100); r.free(); g.free(); print(chosen_library())"
+    "r = mujoco.MjrContext(m, mujoco.mjtFontScale.mjFONTSCALE_100);"
+    "r.free(); g.free(); print(chosen_library())"
 )
 _RENDER_PATIENCE = 60.0
 _NAME = re.compile(r"^[A-Za-z0-9._-]+")
