@@ -65,8 +65,9 @@ def field_pictures(guided: GuidedSeries, scans: Sequence[ReadScan], config: Navi
         )
         for item, note in _instants(guided, usable)
     )
+    first = next((step for step in steps if step.note), steps[0])
     return Panel(
-        key="field", title="Potential field", data=steps[0].data, layout=_layout(), height=560, time=False,
+        key="field", title="Potential field", data=first.data, layout=_layout(), height=560, time=False,
         steps=steps,
         caption="The newest sweep, forward is up. Arrows: what every few rays pull (blue) or push (red), "
         "each kind at its own scale.",

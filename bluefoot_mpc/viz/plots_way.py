@@ -101,13 +101,14 @@ def _bands(guided: GuidedSeries, period: float) -> list[Trace]:
             continue
         x = [value for start, end in spans for value in (start, end, np.nan)]
         share = 100.0 * float(np.mean(leads[guided.reports] == name))
+        digits = 0 if 1.0 <= share <= 99.0 or share == 100.0 else 1
         traces.append(
             {
                 "type": "scatter",
                 "mode": "lines",
                 "x": pack(x),
                 "y": pack([0.0] * len(x)),
-                "name": f"{GUIDED_NAMES[name]}, {share:.0f} %",
+                "name": f"{GUIDED_NAMES[name]}, {share:.{digits}f} %",
                 "line": {"color": colour, "width": 16},
                 "hoverinfo": "name",
             }

@@ -129,6 +129,7 @@ def cloud(run: RunData, scans: list[ReadScan], most: int) -> FloatArray:
     if not len(points):
         return points
     cells = np.round(points / CELL).astype(np.int64)
-    _, first = np.unique(cells, axis=0, return_index=True)
+    # One number for each cell: sorting pairs takes ten times as long.
+    _, first = np.unique(cells[:, 0] * (1 << 24) + cells[:, 1], return_index=True)
     kept = points[np.sort(first)]
     return np.asarray(kept[:: max(1, -(-len(kept) // most))])

@@ -112,7 +112,7 @@
       buttons[next].focus();
       buttons[next].click();
     });
-    choose(0);
+    choose(Math.max(0, buttons.findIndex((button) => button.title)));
   }
 
   let busy = false;
