@@ -183,8 +183,7 @@ class RobotEnd:
         if snapshot is None or snapshot is self._seen:
             return
         self._seen = snapshot
-        for number in self.inbox.progress(snapshot.telemetry):
-            self.writer.answer(mavlink.MAVLink_mission_item_reached_message(number))
+        self._tell_progress(snapshot)
         led = tell.led(snapshot)
         # Another number in the same words is nothing new.
         words = _NUMBER.sub("#", led)
@@ -195,6 +194,15 @@ class RobotEnd:
             self._schedule.hurry("navigation", now)
             if led:
                 self.say(mavlink.MAV_SEVERITY_INFO, f"{tell.NAVIGATION_TEXT}{led}")
+
+    def _tell_progress(self, snapshot: Snapshot) -> None:
+        tasks, report = self.inbox.tasks, snapshot.telemetry.navigation
+        before = len(tasks.missed)
+        for number in self.inbox.progress(snapshot.telemetry):
+            self.writer.answer(mavlink.MAVLink_mission_item_reached_message(number))
+        why = "" if report is None else report.reason.rpartition("given up")[2]
+        for number in tasks.missed[before:]:
+            self.say(mavlink.MAV_SEVERITY_WARNING, f"waypoint {number + 1} given up{why}")
 
     def _is_meant(self, message: Any) -> bool:
         component = message.target_component in (0, self._config.robot_component)

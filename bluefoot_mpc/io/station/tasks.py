@@ -20,7 +20,7 @@ SPEED_MAX = 1.0
 """m/s; more is not asked for in earnest. What the robot really does is far below."""
 DISTANCE_MAX = 5.0
 """m."""
-NEAR = 0.3
+NEAR = 0.2
 """m; a waypoint that is passed from farther away was given up."""
 _DEFAULT = Guide(task=GuideTask.GOTO)
 _GROUND_SPEED = float(mavlink.SPEED_TYPE_GROUNDSPEED)
@@ -39,11 +39,13 @@ class TaskBoard:
         points: (n, 2) m, waypoints in the odometry frame.
         speed: m/s, at most, on the way to waypoints.
         guide: the task in force; None while the robot is told where to go.
+        missed: numbers of the waypoints that were given up since the start.
     """
 
     points: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     speed: float = _DEFAULT.speed
     guide: Guide | None = None
+    missed: list[int] = field(default_factory=list)
     _paused: Guide | None = None
     _begun: int = 0
     _first: int = 0
@@ -57,7 +59,7 @@ class TaskBoard:
         if self._paused is not None and self._paused.task is GuideTask.GOTO:
             self._paused = None
         self.points = points
-        self._first, self._left, self._started = 0, len(points), False
+        self._first, self._left, self._started, self.missed = 0, len(points), False, []
 
     def execute(self, number: int, parameters: list[float]) -> int:
         """Carry out one of `ORDERS`; gives its MAV_RESULT."""
@@ -111,6 +113,7 @@ class TaskBoard:
         if self._left == 0:
             self.guide = self._paused = None
         away = np.hypot(*(guide.waypoints - telemetry.estimate.position[:2]).T)
+        self.missed += [self._first + number for number in passed if away[number] >= NEAR]
         return [self._first + number for number in passed if away[number] < NEAR]
 
     def current(self) -> tuple[int, int, int]:
@@ -141,7 +144,7 @@ class TaskBoard:
         if self._runs() and begun == self._begun:
             return ACCEPTED  # the order came again because its answer was lost
         self._begun = self._first = begun
-        self._left, self._started = total - begun, True
+        self._left, self._started, self.missed = total - begun, True, []
         self.guide = Guide(task=GuideTask.GOTO, speed=self.speed, waypoints=self.points[begun:])
         self._paused = None
         return ACCEPTED

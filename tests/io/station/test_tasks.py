@@ -201,6 +201,7 @@ def test_progress_is_told_once_and_the_end_is_to_stand(inbox):
     assert motion(inbox).guide is wanted.guide
     # The second was given up on the way, the third is reached.
     assert inbox.progress(tick(wanted, 0, at=(3.05, 0.0), guided=Guided.ARRIVED)) == [2]
+    assert inbox.tasks.missed == [1]
     assert (motion(inbox).mode, motion(inbox).guide) == (Mode.STAND, None)
     assert inbox.tasks.current() == (2, 3, mavlink.MISSION_STATE_COMPLETE)
     # It may begin again.
@@ -318,6 +319,17 @@ def test_the_station_asks_for_a_task_and_sees_how_it_goes():
     # What holds still is not asked for again: a robot that has arrived stays there.
     assert pair.run(3.0, wish).mode is Mode.STAND
     assert len(pair.ground.orders) == 1
+
+
+def test_a_waypoint_without_a_way_to_it_is_told():
+    pair = Pair()
+    pair.left = 2
+    wish = walk_with(GuideTask.GOTO, waypoints=POINTS[:2])
+    pair.run(1.0, wish)
+    pair.left, pair.guided, pair.reason = 0, Guided.ARRIVED, "waypoint 1 given up: no way to it"
+    pair.run(2.0, wish)
+    assert "waypoint 2 given up: no way to it" in pair.texts
+    assert pair.ground.picture.mission.complete
 
 
 def test_the_station_ends_a_task_with_a_stick_or_a_mode():
