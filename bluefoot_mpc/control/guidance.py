@@ -9,7 +9,13 @@ import numpy as np
 from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.navigation.config import NavigationConfig
 from bluefoot_mpc.navigation.navigator import Navigator
-from bluefoot_mpc.types import BodyState, MotionCommand, NavigationReport, SensorFrame, TrunkPose
+from bluefoot_mpc.types import BodyState, Guided, MotionCommand, NavigationReport, SensorFrame, TrunkPose
+
+_NOTEWORTHY = {
+    Guided.ARRIVED: "arrived:",
+    Guided.ESCAPE: "boxed in:",
+    Guided.BLIND: "nothing to go by, the robot stands:",
+}
 
 
 class Guidance:
@@ -23,15 +29,17 @@ class Guidance:
     def __init__(self, config: NavigationConfig, mounts: SensorMounts) -> None:
         self._navigator = Navigator(config, mounts)
         self._guides = False
+        self._told: Guided | None = None
 
     def reset(self) -> None:
         """Forget everything."""
         self._navigator.reset()
         self._guides = False
+        self._told = None
 
     def step(
         self, motion: MotionCommand, frame: SensorFrame, estimate: BodyState, *, walks: bool, dt: float
-    ) -> tuple[MotionCommand, NavigationReport | None]:
+    ) -> tuple[MotionCommand, NavigationReport | None, tuple[str, ...]]:
         """One tick.
 
         Args:
@@ -42,17 +50,25 @@ class Guidance:
             dt: s.
 
         Returns:
-            The command with the motion that was decided, and how it was; None without a guide.
+            The command with the motion that was decided; how it was, None without a guide; and what a person
+            should know of it.
         """
         if motion.guide is None:
             if self._guides:
                 self.reset()
-            return motion, None
+            return motion, None, ()
         self._guides = True
         if not walks:
-            return motion, None
+            return motion, None, ()
         decision = self._navigator.step(motion.guide, frame, estimate, dt)
         pitched = np.array([0.0, decision.pitch, 0.0])
         trunk = TrunkPose(position=motion.trunk.position, rpy=motion.trunk.rpy + pitched)
         guided = replace(motion, velocity=decision.velocity, yaw_rate=decision.yaw_rate, trunk=trunk)
-        return guided, decision.report
+        return guided, decision.report, self._events(decision.report)
+
+    def _events(self, report: NavigationReport) -> tuple[str, ...]:
+        """That the goal is reached, or that the robot is in trouble, when that begins."""
+        before, self._told = self._told, report.guided
+        if report.guided is before or report.guided not in _NOTEWORTHY:
+            return ()
+        return (f"navigation: {_NOTEWORTHY[report.guided]} {report.reason}".rstrip(": "),)

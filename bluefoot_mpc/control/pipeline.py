@@ -147,7 +147,7 @@ class Pipeline:
         urgent = plans.more_urgent(safety or SafetyRequest(), own)
         changed = self._advance_mode(urgent, float(upright[2, 2]))
         walks = self._walks(estimate)
-        guided, navigation = self._guidance.step(self._wanted, frame, estimate, walks=walks, dt=dt)
+        guided, navigation, found = self._guidance.step(self._wanted, frame, estimate, walks=walks, dt=dt)
         motion = self._in_force(guided, walks)
         twist = self._corrected(motion, estimate, upright)
         gait = self._gait.step(self._gait_inputs(twist, motion, estimate, upright), dt)
@@ -168,7 +168,7 @@ class Pipeline:
         )
         telemetry = Telemetry(
             time=frame.time, mode=self._modes.mode, motion=motion, estimate=estimate, phase=gait.phase,
-            reference=reference, zmp=zmp, events=begun + held + cut + changed + leveling,
+            reference=reference, zmp=zmp, events=begun + found + held + cut + changed + leveling,
             plan=planned, level=level, navigation=navigation,
         )  # fmt: skip
         return ControlOutput(command=command, telemetry=telemetry)

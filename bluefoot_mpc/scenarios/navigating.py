@@ -106,7 +106,7 @@ class GotoConfig(GuidedConfig):
     """Going to waypoints."""
 
     duration: float = 60.0  # s, at most
-    waypoints: tuple[tuple[float, float], ...] = ((1.5, 0.0), (1.5, 1.0), (0.0, 0.0))  # m, forward and left
+    waypoints: tuple[tuple[float, float], ...] = ((1.5, 0.8), (2.6, -0.8), (0.0, 0.0))  # m, forward and left
     # of where the run starts
 
     def __post_init__(self) -> None:
@@ -123,7 +123,7 @@ class Goto(GuidedScenario):
     name = "goto"
     Config = GotoConfig
     config: GotoConfig
-    default_world = "room"
+    default_world = "arena"
 
     def guide(self) -> Guide:
         """Go to the waypoints."""
@@ -153,11 +153,15 @@ class Goto(GuidedScenario):
         return [not_fallen(summary), *nearness_criteria(summary), reached]
 
     def _distances(self, run: RunData) -> list[float]:
-        """m, nearest true distance of the trunk to each waypoint; empty without truth."""
+        """m, true distance of the trunk to each waypoint when the next one became its goal, or at the end."""
         if not run.truth:
             return []
-        place = run.stack("truth", "q")[:, :2]
-        return [float(np.hypot(*(place - point).T).min()) for point in np.array(self.config.waypoints)]
+        points = np.array(self.config.waypoints)
+        ticks = [len(run.truth) - 1] * len(points)
+        for k, record in reversed(list(enumerate(run.telemetry[: len(run.truth)]))):
+            done = 0 if record.navigation is None else len(points) - record.navigation.waypoints_left
+            ticks[:done] = [k] * done
+        return [math.dist(run.truth[k].q[:2], point) for k, point in zip(ticks, points, strict=True)]
 
 
 def nearness_criteria(summary: Mapping[str, Any]) -> list[Criterion]:

@@ -34,7 +34,7 @@ class ScriptedNavigator:
     """Decides the same on every tick and notes what it was asked."""
 
     def __init__(self, config, mounts):
-        self.steps, self.resets = [], 0
+        self.steps, self.resets, self.guided = [], 0, Guided.FIELD
 
     def reset(self):
         self.resets += 1
@@ -42,7 +42,7 @@ class ScriptedNavigator:
     def step(self, guide, frame, estimate, dt):
         self.steps.append((guide, frame, estimate))
         report = NavigationReport(
-            guided=Guided.FIELD, velocity=np.array([0.1, 0.02]), yaw_rate=0.3, pitch=0.05,
+            guided=self.guided, reason="why", velocity=np.array([0.1, 0.02]), yaw_rate=0.3, pitch=0.05,
             field=np.zeros(2), potential=0.0, mixing=0.0, marker=np.full(3, math.nan),
             marker_position=np.full(3, math.nan), marker_age=math.inf, clearance=math.inf,
         )  # fmt: skip
@@ -111,3 +111,15 @@ def test_a_robot_that_must_not_walk_does_not_whatever_navigation_wants(pipeline,
     assert telemetry.motion.yaw_rate == 0.0
     assert telemetry.navigation is None
     assert len(pipeline._guidance._navigator.steps) <= asked + 1
+
+
+def test_trouble_and_arrival_are_told_once_when_they_begin(pipeline):
+    def told(guided, ticks):
+        pipeline._guidance._navigator.guided = guided
+        outputs = [pipeline.step(pipeline.frame, WANDER, None).telemetry for _ in range(ticks)]
+        return [e for telemetry in outputs for e in telemetry.events if e.startswith("navigation")]
+
+    assert told(Guided.FIELD, 3) == []
+    assert told(Guided.BLIND, 3) == ["navigation: nothing to go by, the robot stands: why"]
+    assert told(Guided.FIELD, 1) == []
+    assert told(Guided.ARRIVED, 2) == ["navigation: arrived: why"]

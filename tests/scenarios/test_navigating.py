@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.scenarios import RunOptions
 from bluefoot_mpc.scenarios.config import resolve
 from bluefoot_mpc.scenarios.registry import find_scenario
@@ -58,7 +58,7 @@ def test_impossible_values_are_refused(name, override):
 
 
 def test_an_unknown_leader_is_refused_with_the_valid_ones():
-    with pytest.raises(UnknownNameError, match="mecanum"):
+    with pytest.raises(ConfigurationError, match="mecanum"):
         resolved("follow", leader="hovercraft")
 
 
@@ -91,7 +91,7 @@ def test_without_a_lidar_the_robot_stands_and_says_why():
 @pytest.mark.slow
 def test_waypoints_are_reached_in_order():
     overrides = ("scenario.waypoints=[[0.8, 0.0], [0.8, 0.4]]",)
-    result = simulate("goto", RunOptions(duration=30.0, world="flat", overrides=overrides))
+    result = simulate("goto", RunOptions(duration=30.0, overrides=overrides))
     assert result.success, result.criteria
     assert result.summary["figures"]["waypoints_left"] == 0
     assert math.isfinite(result.summary["figures"]["arrived_s"])
