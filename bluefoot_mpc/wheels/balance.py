@@ -75,6 +75,12 @@ class BalancingDrive:
         """(4,) the filter's estimate of `body_state`."""
         return self._filter.state[:4].copy()
 
+    @property
+    def motor_torque(self) -> FloatArray:
+        """(2,) N·m of the left and the right motor."""
+        total, difference = self._torques.tolist()
+        return 0.5 * np.array([total - difference, total + difference])
+
     def push(self, impulse: float) -> None:
         """Strike the body's centre of mass forward with an impulse (N·s)."""
         body, tilt = self.config.body, float(self.body_state[2])

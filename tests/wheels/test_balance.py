@@ -10,6 +10,7 @@ from bluefoot_mpc.wheels.balance_sensing import filter_model
 from bluefoot_mpc.wheels.constraints import rolling_matrix, sliding_matrix
 from bluefoot_mpc.wheels.drive import WheelDrive
 from bluefoot_mpc.wheels.frames import moved
+from bluefoot_mpc.wheels.pendulum import WheeledPendulum
 from bluefoot_mpc.wheels.ready import READY, balancing, differential
 
 DT = 0.02
@@ -74,7 +75,7 @@ def test_without_the_regulator_it_falls_and_then_stays_where_it_lies():
     assert abs(states[-1].tilt) >= drive.config.fall_angle
 
 
-@pytest.mark.parametrize("impulse", [0.1, -0.1])
+@pytest.mark.parametrize("impulse", [0.1, -0.1, 0.4])
 def test_it_catches_a_push(impulse):
     drive = BalancingDrive(seed=4)
     run(drive, [0.0, 0.0, 0.0], 1.0)
@@ -121,6 +122,28 @@ def test_filter_model_has_the_right_signs():
     assert encoder == pytest.approx(-0.1)
     assert gyro == 0.0
     assert accelerometer < -0.9  # held: -0.981; let go, the axle runs back besides
+
+
+def test_friction_does_not_hold_it_back():
+    """Torque against friction is known beforehand: path and heading do not lag for want of it."""
+    config = BalanceConfig(body=WheeledPendulum(friction=0.02))
+    drive = BalancingDrive(config=config, seed=9)
+    left, right = run(drive, [0.12, 0.0, 0.6], 5.0)[-1].wheel_angle * config.body.wheel_radius
+    ahead = 0.12 * (5.0 - 0.5 * 0.12 / config.max_acceleration)
+    turned = 0.6 * (5.0 - 0.5 * 0.6 / config.max_yaw_acceleration)
+    assert 0.5 * (left + right) == pytest.approx(ahead, abs=0.01)
+    assert (right - left) / (2 * drive.robot.wheels[0].length) == pytest.approx(turned, abs=0.02)
+
+
+def test_motors_never_give_more_than_they_can_and_staying_up_comes_first():
+    drive, highest = BalancingDrive(config=BalanceConfig(torque_limit=0.1), seed=10), 0.0
+    for tick in range(400):
+        if tick % 100 == 50:
+            drive.push(0.25)
+        state = drive.step(np.array([0.0, 0.0, 2.0 if tick % 20 < 10 else -2.0]), 0.005)
+        highest = max(highest, float(np.abs(drive.motor_torque).max()))
+    assert not state.fallen
+    assert highest == pytest.approx(0.1)
 
 
 def test_worse_sensors_make_it_sway_more():
