@@ -231,7 +231,7 @@ class _Progress:
 
     def __init__(self, link: GroundLink, last: FloatArray) -> None:
         self._link, self._last = link, last
-        self._begun = self._seen = math.inf
+        self._begun = self._ended = self._seen = math.inf
         self.open, self.arrived, self.refusal = True, False, ""
 
     def look(self) -> None:
@@ -246,11 +246,17 @@ class _Progress:
             self._link.look(lambda picture: self._judge(picture, now))
 
     def _judge(self, picture: RobotPicture, now: float) -> None:
-        # What was told before the robot began is about another list.
-        if picture.arrived.get("MISSION_CURRENT", -math.inf) > self._begun and picture.mission.complete:
-            # Points that it finds no way to are left out.
-            self.open = False
-            self.arrived = math.dist(picture.position[:2], self._last) < NEAR
+        # What was told before the robot began is about another list, and a place from before the end is old.
+        def told(kind: str, since: float) -> bool:
+            return picture.arrived.get(kind, -math.inf) > since
+
+        if self._ended < math.inf:
+            if told("LOCAL_POSITION_NED", self._ended):
+                self.open = False
+                # Points that it finds no way to are left out.
+                self.arrived = math.dist(picture.position[:2], self._last) < NEAR
+        elif told("MISSION_CURRENT", self._begun) and picture.mission.complete:
+            self._ended = now
         elif picture.task == GuideTask.GOTO:
             self._seen = now
         elif now - self._seen > _GONE:
