@@ -110,6 +110,8 @@ class RenderedCamera:
         """
         if not self._freed.alive:
             raise RuntimeError("the camera is closed")
+        # Where the lights are; kinematics leave them where they were.
+        mujoco.mj_camlight(self._model, self._data)
         everything = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(
             self._model, self._data, self._option, None, self._view, everything, self._scene

@@ -7,18 +7,20 @@ from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.io.camera import CameraError
 from bluefoot_mpc.io.clock import VirtualClock
 from bluefoot_mpc.io.findings import Severity
+from bluefoot_mpc.io.servo_robot.config import DevicesConfig
 from bluefoot_mpc.model.robot import load_robot
 from bluefoot_mpc.runtime.log import read_log
 from bluefoot_mpc.runtime.replay import rethink
 from bluefoot_mpc.scenarios import RunOptions, pipeline_from_log, run, runner
 from bluefoot_mpc.scenarios.config import resolve
+from bluefoot_mpc.scenarios.emulated import emulate
 from bluefoot_mpc.scenarios.emulated_camera import EmulatedCamera
 from bluefoot_mpc.scenarios.registry import SHIPPED
 from bluefoot_mpc.sim.body import Posture
-from bluefoot_mpc.sim.config import SimConfig
+from bluefoot_mpc.sim.config import SimConfig, WorldConfig
 from bluefoot_mpc.sim.plant import SimPlant
 from bluefoot_mpc.sim.robot import SimRobot
-from bluefoot_mpc.sim.sight_config import CameraConfig
+from bluefoot_mpc.sim.sight_config import CameraConfig, LidarConfig
 from tests.graphics import needs_graphics
 
 pytestmark = [pytest.mark.slow, needs_graphics]
@@ -148,3 +150,13 @@ def test_no_pictures_come_through_ports():
     options = RunOptions(robot="emulator", link="pty", duration=1.0, overrides=("sim.camera.enabled=true",))
     with pytest.raises(ConfigurationError, match="--link pty"):
         runner._prepare(resolve(SHIPPED["stand"], options))
+
+
+@pytest.mark.parametrize("switch", ["lidar", "devices"])
+def test_the_emulated_lidar_has_the_simulations_errors(model, switch):
+    errors = LidarConfig(enabled=switch == "lidar", dropouts=1.0)
+    sim = SimConfig(lidar=errors, world=WorldConfig(name="room"), settle_time=0.05)
+    posture = Posture(joints=model.stance_joints, height=0.12)
+    parts = emulate(model, sim, posture, 0, DevicesConfig(emulate_lidar=switch == "devices"))
+    assert parts.lidar is not None
+    assert not np.any(parts.lidar._source.scan(0.1))
