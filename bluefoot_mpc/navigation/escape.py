@@ -17,6 +17,7 @@ class EscapeConfig:
     """When the robot counts as stuck, and what it does then."""
 
     patience: float = 4.0  # s without motion
+    stall: float = 0.5  # s in which the guard lets nothing pass
     distance: float = 0.05  # m, that count as motion
     turn_deg: float = 10.0  # degrees, that do
     away_time: float = 2.0  # s of making room
@@ -31,8 +32,9 @@ class EscapeConfig:
 
     def __post_init__(self) -> None:
         require_positive(
-            patience=self.patience, distance=self.distance, turn_deg=self.turn_deg, away_time=self.away_time,
-            turn_time=self.turn_time, back_time=self.back_time, side_time=self.side_time,
+            patience=self.patience, stall=self.stall, distance=self.distance, turn_deg=self.turn_deg,
+            away_time=self.away_time, turn_time=self.turn_time, back_time=self.back_time,
+            side_time=self.side_time,
             yaw_rate=self.yaw_rate, back_speed=self.back_speed, side_speed=self.side_speed,
             enough_deg=self.enough_deg, enough=self.enough,
         )  # fmt: skip

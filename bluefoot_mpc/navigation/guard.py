@@ -25,7 +25,7 @@ from bluefoot_mpc.types import BoolArray, FloatArray
 class GuardConfig:
     """Distances to keep, and how motions are weighed against each other."""
 
-    least: float = 0.14  # m from the outline that no motion goes below
+    least: float = 0.13  # m from the outline that no motion goes below
     comfortable: float = 0.25  # m; nearer costs
     away: float = 0.005  # m that a robot which is too near must gain by a motion
     slack: float = 0.004  # m that it may lose on the way

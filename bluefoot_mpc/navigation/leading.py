@@ -159,12 +159,23 @@ class Leading:
         wish = self.wish
         if wish is None:
             return Lead(Guided.SEARCH, Motion())
-        motion = wish.motion
-        if wish.share < 1.0:
+        motion, share = wish.motion, wish.share
+        if wish.guided is Guided.MARKER and guide.task is GuideTask.APPROACH and self._detour(around):
+            share = 0.0
+        if share < 1.0:
             lidar = self._towards_marker(wish.goal, guide, around)
-            share = wish.share
             motion = Motion(*(share * a + (1.0 - share) * b for a, b in zip(motion, lidar, strict=True)))
         return Lead(wish.guided, motion, wish.reason)
+
+    def _detour(self, around: Surroundings) -> bool:
+        """True where the way to the marker leads around something: the camera sees it, but not a way."""
+        way = self._goal_way.way
+        if len(way) < 2:
+            return False
+        steps = np.diff(way, axis=0)
+        length = float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+        straight = math.dist(way[-1], around.pose[:2])
+        return length > self._config.marker.detour * straight + self._config.marker.detour_least
 
     def _towards_marker(self, goal: FloatArray | None, guide: Guide, around: Surroundings) -> Motion:
         if goal is None:

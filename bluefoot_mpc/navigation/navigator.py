@@ -68,6 +68,8 @@ class Navigator:
         self._motion = Motion()
         self._gait = Motion()
         self._clearance = math.inf
+        self._stalled: float | None = None
+        self._time = -math.inf
 
     def step(self, guide: Guide, frame: SensorFrame, estimate: BodyState, dt: float) -> Decision:
         """One tick.
@@ -79,6 +81,9 @@ class Navigator:
             dt: s, command period.
         """
         around, leading = self._around, self._leading
+        if frame.time - self._time > self._config.scan.stale_after:
+            self._begin_afresh()  # it did not walk in between
+        self._time = frame.time
         fresh = around.step(frame, estimate)
         leading.look(guide, frame, estimate, dt)
         if fresh and around.scan is not None:
@@ -95,29 +100,34 @@ class Navigator:
     def _decide(self, guide: Guide, scan: LevelScan, time: float) -> None:
         """What to do until the next sweep."""
         lead = self._leading.step(guide, self._around, scan)
-        lead = self._out_of_the_corner(lead, time)
+        self._lead = lead = self._out_of_the_corner(lead, time)
         wanted = allowed(lead.motion, guide.speed, self._config.limits)
         guarded = self._guard.step(self._around.points(), wanted, self._gait)
-        self._lead = lead
         self._wanted, self._clearance = guarded.motion, guarded.clearance
+        if any(guarded.motion) or not any(wanted):
+            self._stalled = None
+        elif self._stalled is None:
+            self._stalled = time
 
     def _out_of_the_corner(self, lead: Lead, time: float) -> Lead:
         """The way out in place of what leads, where the robot has been stuck."""
         pose = self._around.pose
         rests = self._watch.rests(pose, time)
         if not any(lead.motion):
-            self._watch.reset()
-            self._escape.reset()
+            self._begin_afresh()
             return lead
-        if not self._escape.active and rests > self._config.escape.patience:
+        stuck = rests > self._config.escape.patience
+        stalled = self._stalled is not None and time - self._stalled >= self._config.escape.stall
+        if not self._escape.active and (stuck or stalled):
             self._escape.begin(pose, time, self._around.openness())
-            self._leading.give_up(time)
+            if stuck:
+                self._leading.give_up(time)
         if self._escape.active:
             room = self._guard.away(self._around.points(), self._gait)
             motion = self._escape.step(pose, time, room)
             if self._escape.active:
-                return Lead(Guided.ESCAPE, motion, "stuck: turning, backing off, stepping aside in turn")
-            self._watch.reset()
+                return Lead(Guided.ESCAPE, motion, "stuck: making room, turning, backing off in turn")
+            self._begin_afresh()
         return lead
 
     def _stand(self, reason: str) -> None:
@@ -125,8 +135,13 @@ class Navigator:
         self._lead = Lead(Guided.BLIND, Motion(), reason)
         self._wanted = Motion()
         self._leading.rest()
+        self._begin_afresh()
+
+    def _begin_afresh(self) -> None:
+        """From now on the robot has time to get going."""
         self._watch.reset()
         self._escape.reset()
+        self._stalled = None
 
     def _decision(self) -> Decision:
         leading, wish, scan = self._leading, self._leading.wish, self._around.scan

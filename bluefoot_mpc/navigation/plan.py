@@ -23,7 +23,7 @@ class PlanConfig:
 
     room: float = 0.40  # m from the robot's middle to a thing, at least
     comfortable: float = 0.60  # m; nearer costs
-    near_cost: float = 3.0  # times the length, added at `room`
+    near_cost: float = 6.0  # times the length, added at `room`
     unseen_cost: float = 1.5  # times the length, added where nothing has been seen yet
     start: float = 0.35  # m around the robot that it may always leave
 

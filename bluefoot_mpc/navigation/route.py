@@ -20,7 +20,7 @@ Place = tuple[float, float]
 class RouteConfig:
     """How a way is followed."""
 
-    lookahead: float = 0.5  # m along the way to the place that is steered to
+    lookahead: float = 0.4  # m along the way to the place that is steered to
     share: float = 0.75  # of the way in the direction; the rest is the potential field's
     yaw_gain: float = 1.2  # 1/s, turn for an error of the direction
     turn_first_deg: float = 60.0  # degrees off the direction from which the robot turns in place
