@@ -140,6 +140,7 @@ def live_page(robot: RobotModel, stage: Stage | None = None) -> str:
         "live.html.j2",
         title=f"{robot.parameters.name}, live",
         has_truth=True,
+        has_room=bool(data.get("bounds")),
         plots_follow=False,
         run_data=embed_json(data),
         viewer_script=embed_script(viewer_script()),
