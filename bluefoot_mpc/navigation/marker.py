@@ -37,7 +37,7 @@ class MarkerConfig:
     least_value: float = 0.10  # 0..1, brightest of red, green and blue
     least_radius: float = 3.5  # pixels of a picture 640 wide: 8 m away for a ball of 0.06 m
     greatest_radius: float = 0.34  # share of the picture's height: 0.2 m away for a ball of 0.06 m
-    least_arc_deg: float = 95.0  # degrees of the outline that must be in sight
+    least_arc_deg: float = 110.0  # degrees of the outline that must be in sight
     least_support: float = 0.72  # share of the outline in sight where an edge fits
     least_merged_support: float = 0.62  # the same before something of the marker's colour
     greatest_residual: float = 0.008  # of the radius, mean distance of the edge from the fit

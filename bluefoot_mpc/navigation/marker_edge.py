@@ -29,6 +29,12 @@ INSIDE = (0.45, 0.65, 0.82)
 """Of the angular radius: where the marker's colour must be, on a ray that counts."""
 OUTSIDE = 1.25
 """Of the angular radius: where it should not be; else something of the same colour is behind."""
+SMALL = 8.0
+"""Pixels of radius below which a square is nearly a circle, and more of the edge must fit."""
+WHOLE = 0.6
+"""Share of an outline in sight below which it must be twice as large for that."""
+SMALL_SUPPORT = 0.85
+"""Share of a small outline in sight on which an edge must fit."""
 REWEIGHTED = 3
 """Rounds of least squares in which what is far off loses its weight."""
 TOLERANCE = 0.02
@@ -265,7 +271,10 @@ def _judged(rim: Rim, limits: Limits) -> Cone | None:
     support = float(fits.sum() / edge.seen.sum())
     merged = float(rim.coloured((OUTSIDE,))[edge.seen].mean()) > 0.2
     residual = float(distance[fits].mean())
-    if support < (limits.least_merged_support if merged else limits.least_support):
+    least = limits.least_merged_support if merged else limits.least_support
+    if cone.angle < (SMALL if arc > WHOLE else 2.0 * SMALL) * rim.pixel:
+        least = max(least, SMALL_SUPPORT)
+    if support < least:
         return None
     if residual > max(limits.greatest_residual * cone.angle, 0.4 * rim.pixel):
         return None

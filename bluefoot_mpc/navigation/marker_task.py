@@ -11,10 +11,10 @@ from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.navigation import servoing
 from bluefoot_mpc.navigation.limits import Motion
 from bluefoot_mpc.navigation.marker import MarkerConfig, MarkerFinder, Sighting
-from bluefoot_mpc.navigation.search import Search, SearchConfig
+from bluefoot_mpc.navigation.search import Phase, Search, SearchConfig
 from bluefoot_mpc.navigation.servoing import Servo, ServoingConfig
 from bluefoot_mpc.navigation.target import Target, TargetConfig
-from bluefoot_mpc.settings import require_positive
+from bluefoot_mpc.settings import require_positive, require_range
 from bluefoot_mpc.types import BodyState, CameraImage, FloatArray, Guide, Guided, GuideTask, SensorFrame
 
 
@@ -27,9 +27,17 @@ class MarkerTaskConfig:
     servoing: ServoingConfig = field(default_factory=ServoingConfig)
     search: SearchConfig = field(default_factory=SearchConfig)
     blink: float = 0.5  # s without a sighting for which the camera goes on leading
+    remember: float = 90.0  # s for which a marker that stands is gone to without a sighting
+    remember_beyond: float = 0.5  # m more than the wanted distance: nearer it must be in view
+    detour: float = 1.15  # times the straight line: a longer way is one around something
+    detour_least: float = 0.2  # m, that do not count
 
     def __post_init__(self) -> None:
-        require_positive(blink=self.blink)
+        require_positive(
+            blink=self.blink, remember=self.remember, remember_beyond=self.remember_beyond,
+            detour_least=self.detour_least,
+        )  # fmt: skip
+        require_range(1.0, 10.0, detour=self.detour)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -104,22 +112,31 @@ class MarkerTask:
         """
         self._target.remember(estimate)
         if frame.camera is not None:
-            self._look(frame.camera)
-        time = estimate.time
+            self._look(frame.camera, guide.task is GuideTask.FOLLOW)
         seen = self._sighting
         row = math.nan if seen is None else seen.row
         wanted = servoing.camera_pitch(row, 1 if seen is None else seen.height, self._config.servoing)
         self._servo = servoing.pitched(self._servo, wanted, dt, self._config.servoing)
-        if self._target.age(time) <= self._config.blink:
+        if self._leads(guide, estimate):
             self._search.reset()
             return self._lead(guide, estimate)
         self._servo = self._servo._replace(standing=False)
         return self._seek(estimate)
 
-    def _look(self, image: CameraImage) -> None:
+    def _leads(self, guide: Guide, estimate: BodyState) -> bool:
+        """True while the marker is in view, or stands somewhere farther off where it has been seen."""
+        age = self._target.age(estimate.time)
+        if age <= self._config.blink:
+            return True
+        if guide.task is GuideTask.FOLLOW or age > self._config.remember:
+            return False
+        relative = self._target.relative(estimate)
+        return relative is not None and relative.distance > guide.distance + self._config.remember_beyond
+
+    def _look(self, image: CameraImage, moves: bool) -> None:
         self._sighting = self._finder.find(image, self._expected(image))
         self._reason = self._finder.reason
-        if self._sighting is not None and not self._target.see(self._sighting):
+        if self._sighting is not None and not self._target.see(self._sighting, moves):
             self._sighting = None
             self._reason = "a marker is seen, but not where it can be"
 
@@ -141,7 +158,8 @@ class MarkerTask:
         self._servo, motion = law(self._servo, relative, guide.distance, guide.speed, config)
         # The radius that the marker has at this distance: a missed picture does not change who leads.
         radius = self._ball_focal / max(relative.distance, 0.05)
-        share = servoing.mixing(radius, config)
+        in_view = self._target.age(estimate.time) <= self._config.blink
+        share = servoing.mixing(radius if in_view else 0.0, config)
         if self._servo.standing:
             share = 1.0
         goal = self._stand_off(estimate, guide.distance)
@@ -154,6 +172,8 @@ class MarkerTask:
         place = self._target.position_at(estimate.time) if self._target.known else None
         wish = self._search.step(estimate, place)
         self._reason = str(wish.phase)
+        if wish.phase is Phase.WANDER:
+            self._target.forget()
         share = 0.0 if wish.motion is None else 1.0
         return self._wish(estimate, Guided.SEARCH, (wish.motion or Motion(), share, wish.goal), 0.0)
 

@@ -25,7 +25,7 @@ class ServoingConfig:
 
     speed_decay: float = 2.0e-3  # 1/px², c_r of the printed speed
     mix_radius: float = 30.0  # px, r_mix: nearer (larger) than this the camera alone leads
-    mix_decay: float = 2.0e-3  # 1/px², c_mix
+    mix_decay: float = 1.5e-2  # 1/px², c_mix
     greatest_yaw_rate: float = 0.4  # rad/s, at the picture's edge
     greatest_pitch: float = 0.05  # rad, of the trunk; more makes the LIDAR see the floor
     pitch_time: float = 0.6  # s in which the trunk's pitch follows

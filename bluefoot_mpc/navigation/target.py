@@ -104,6 +104,10 @@ class Target:
     def reset(self) -> None:
         """Forget everything."""
         self._poses: deque[Pose] = deque()
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget the marker, not where the robot was."""
         self._state = np.zeros(4)
         self._covariance = np.zeros((4, 4))
         self._height = 0.0
@@ -187,8 +191,13 @@ class Target:
         covariance = along**2 * np.outer(ahead, ahead) + across**2 * np.outer(side, side)
         return Fix(pose.position + rotation @ self._camera + way, distance, covariance)
 
-    def see(self, sighting: Sighting) -> bool:
-        """Take a sighting in; False where it is not believed."""
+    def see(self, sighting: Sighting, moves: bool = True) -> bool:
+        """Take a sighting in; False where it is not believed.
+
+        Args:
+            sighting: of the newest picture.
+            moves: whether the marker may move; one that stands has no velocity to be predicted with.
+        """
         fix = self.fix(sighting)
         if fix is None or not self._config.lowest <= fix.position[2] <= self._config.highest:
             return False
@@ -211,6 +220,9 @@ class Target:
         self._state += gain @ offset
         self._covariance -= gain @ self._covariance[:2, :]
         self._covariance = 0.5 * (self._covariance + self._covariance.T)
+        if not moves:
+            self._state[2:] = 0.0
+            self._covariance[2:, :] = self._covariance[:, 2:] = 0.0
         self._height += 0.2 * (float(fix.position[2]) - self._height)
         self._seen, self._strays = sighting.time, 0
         return True
