@@ -86,11 +86,20 @@ def camera_strip(
 
 
 def choose(pictures: Sequence[KeptPicture]) -> list[KeptPicture]:
-    """At most `MOST` pictures in order of time: those of events, and others spread over the run."""
+    """At most `MOST` pictures in order of time.
+
+    Half of them may show events; of the others, those with the marker go before those without, but a
+    third is for these: the search is a part of the run.
+    """
     events = [picture for picture in pictures if picture.event]
     others = [picture for picture in pictures if not picture.event]
-    events = _spread(events, max(_EVENTS, MOST - len(others)))
-    return sorted([*events, *_spread(others, MOST - len(events))], key=lambda picture: picture.time)
+    found = [picture for picture in others if np.isfinite(picture.marker[0])]
+    rest = [picture for picture in others if not np.isfinite(picture.marker[0])]
+    chosen = _spread(events, max(_EVENTS, MOST - len(others)))
+    room = MOST - len(chosen)
+    chosen += _spread(found, max(room - len(rest), room - room // 3))
+    chosen += _spread(rest, MOST - len(chosen))
+    return sorted(chosen, key=lambda picture: picture.time)
 
 
 def _spread(pictures: Sequence[KeptPicture], count: int) -> list[KeptPicture]:

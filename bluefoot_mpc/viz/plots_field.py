@@ -22,8 +22,8 @@ from bluefoot_mpc.viz.style import BAD, COMMAND, ESTIMATE, GUIDED_NAMES, NEUTRAL
 
 INSTANTS = 8
 """Instants that one can step through, at most."""
-ARROW = 0.35
-"""m, length of the longest arrow of a pull, and of a push: each kind has its own scale."""
+PULL, PUSH = 0.35, 0.20
+"""m, length of the longest arrow of a pull, and of a push, which ends before the robot's middle."""
 _REACH = 2.1
 """m around the robot that are shown; arrows of farther points stand at the edge."""
 _ARROWS = 48
@@ -121,12 +121,12 @@ def force_arrows(
     size = force if pulls else -force
     chosen = np.flatnonzero(size > 0.0)
     chosen = chosen[:: max(1, -(-len(chosen) // _ARROWS))]
-    longest = float(size[chosen].max()) if len(chosen) else 1.0
+    scale = (PULL if pulls else PUSH) / (float(size[chosen].max()) if len(chosen) else 1.0)
     pieces = [np.zeros((0, 2))]
     for k in chosen:
         ray = np.array([math.cos(bearing[k]), math.sin(bearing[k])])
-        length = ARROW * float(size[k]) / longest
-        end = min(float(distance[k]), _REACH - ARROW)
+        length = scale * float(size[k])
+        end = min(float(distance[k]), _REACH - PULL)
         # A pull begins short of what it is drawn to, a push at the thing that pushes.
         tip = ray * length if pulls else -ray * length
         pieces.append(arrow(origin + end * ray, tip, 0.3 * length))
@@ -180,9 +180,12 @@ def _instants(guided: GuidedSeries, usable: Sequence[ReadScan]) -> list[tuple[Re
     led = guided.guided
     wanted: dict[int, str] = {}
 
+    apart = float(ticks[-1] - ticks[0]) / (2 * INSTANTS)
+
     def want(tick: int, note: str) -> None:
-        if len(wanted) < INSTANTS:
-            wanted.setdefault(int(np.argmin(np.abs(ticks - tick))), note)
+        index = int(np.argmin(np.abs(ticks - tick)))
+        if len(wanted) < INSTANTS and all(abs(ticks[index] - ticks[k]) >= apart for k in wanted):
+            wanted[index] = note
 
     if guided.closest is not None:
         want(guided.closest, "closest approach")
@@ -190,7 +193,7 @@ def _instants(guided: GuidedSeries, usable: Sequence[ReadScan]) -> list[tuple[Re
     for k in begins[:2]:
         want(k, "boxed in")
     first, last = int(ticks[0]), int(ticks[-1])
-    spread = np.linspace(first, last, INSTANTS - len(wanted) + 2)[:-1]
+    spread = np.linspace(first, last, INSTANTS)
     for tick in spread:
         want(round(float(tick)), "")
     return [(usable[index], wanted[index]) for index in sorted(wanted)]

@@ -17,7 +17,7 @@ from bluefoot_mpc.viz.series import RunSeries
 from bluefoot_mpc.viz.style import BAD, GUIDED_COLOURS, GUIDED_NAMES, LEADER, MARKER, NEUTRAL
 from bluefoot_mpc.viz.surroundings import css_colour, hangs_over, outline
 
-_TOLD = "told where to go"
+_TOLD = "no task"
 _EDGE = 0.3
 """m around the drawn things."""
 

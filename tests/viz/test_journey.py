@@ -113,7 +113,7 @@ def test_the_way_is_coloured_by_what_led(panels: dict[str, Panel], guided_run: R
         assert way[np.isfinite(way[:, 0])] == pytest.approx(truth[ticks], abs=1e-6)
         facts = numbers(named(panels["map"], GUIDED_NAMES[name])["customdata"])
         assert facts[0, 0] == pytest.approx(guided_run.telemetry[ticks[0]].time, abs=1e-5)
-    told = points(named(panels["map"], "told"))
+    told = points(named(panels["map"], "no task"))
     assert told[0] == pytest.approx(truth[0], abs=1e-6)
 
 
@@ -221,7 +221,7 @@ def test_field_picture_shows_sweep_forces_and_sum(panels: dict[str, Panel], guid
     assert math.atan2(-along[0], along[1]) == pytest.approx(math.atan2(*field.force[::-1]), abs=1e-3)
     shafts = traces["pull"].reshape(-1, 6, 2)[:, :2]
     lengths = np.hypot(*(shafts[:, 1] - shafts[:, 0]).T)
-    assert lengths.max() == pytest.approx(plots_field.ARROW, rel=0.05)
+    assert lengths.max() == pytest.approx(plots_field.PULL, rel=0.05)
     # Pulls point away from the robot.
     assert (np.hypot(*shafts[:, 1].T) > np.hypot(*shafts[:, 0].T)).all()
 
@@ -232,8 +232,8 @@ def test_pushes_point_at_the_robot() -> None:
     line = plots_field.force_arrows(np.zeros(2), bearing, np.array([0.4, 0.3, 3.0]), force, pulls=False)
     shafts = line.reshape(-1, 6, 2)[:, :2]
     assert shafts[:, 0] == pytest.approx(np.array([[0.376, -0.137], [0.3, 0.0]]), abs=1e-3)
-    assert shafts[1, 1] == pytest.approx([0.3 - plots_field.ARROW, 0.0])
-    assert np.hypot(*(shafts[0, 1] - shafts[0, 0])) == pytest.approx(0.5 * plots_field.ARROW)
+    assert shafts[1, 1] == pytest.approx([0.3 - plots_field.PUSH, 0.0])
+    assert np.hypot(*(shafts[0, 1] - shafts[0, 0])) == pytest.approx(0.5 * plots_field.PUSH)
 
 
 def test_outlines_have_the_guards_distance() -> None:
