@@ -11,6 +11,7 @@ from bluefoot_mpc.io.station.ground_end import GroundEnd
 from bluefoot_mpc.io.station.mission import PER_METRE
 from bluefoot_mpc.io.station.orders import Order
 from bluefoot_mpc.io.station.robot_end import RobotEnd
+from bluefoot_mpc.io.station.upload import MissionUpload
 from bluefoot_mpc.types import Guide, GuideTask, Mode, MotionCommand
 
 from .made_up import Peer, sent, snapshot
@@ -259,3 +260,44 @@ def test_a_refused_list_is_told_to_the_operator():
     run(robot, ground, lambda: False, many)
     assert (ground.orders[-1].order, ground.orders[-1].result) == (Order.GOTO, "no space")
     assert robot.inbox.tasks.guide is None
+
+
+def test_on_a_noisy_line_a_list_is_true_or_does_not_arrive():
+    """One byte in a hundred is wrong, so four frames in ten of an upload are."""
+    rng = np.random.default_rng(12)
+    came = 0
+    for _ in range(10):
+        robot, ground = RobotEnd(StationConfig(), 0.0), GroundEnd(StationConfig(), 0.0)
+        robot.inbox.load(OLD)
+        points = np.round(rng.uniform(-5.0, 5.0, (5, 2)), 4)
+        motion = MotionCommand(mode=Mode.WALK, guide=Guide(task=GuideTask.GOTO, waypoints=points))
+        for tick in range(3000):
+            now = 0.02 * tick
+            ground.steer(motion, now)
+            robot.offer(snapshot(now))
+            for end, other in ((robot, ground), (ground, robot)):
+                data = np.frombuffer(sent(end, now), np.uint8).copy()
+                hit = rng.random(data.size) < 0.01
+                data[hit] = rng.integers(0, 256, int(hit.sum()))
+                other.receive(data.tobytes(), now)
+            if ground.orders[-1].result:
+                break
+        came += ground.orders[-1].result == "accepted"
+        assert robot.inbox.tasks.points.shape in ((1, 2), (5, 2))
+        assert robot.inbox.tasks.points == pytest.approx(
+            points if len(robot.inbox.tasks.points) == 5 else OLD
+        )
+    assert came >= 8
+
+
+def test_an_answer_to_the_list_before_is_no_answer_to_this_one():
+    upload = MissionUpload(StationConfig(), POINTS, 0.0)
+    ack = mavlink.MAVLink_mission_ack_message(255, 190, mavlink.MAV_MISSION_ACCEPTED, LIST)
+    assert upload.due(0.0).count == 3
+    upload.take(ack, 0.1)
+    assert upload.result == ""
+    for number in range(3):
+        upload.take(mavlink.MAVLink_mission_request_int_message(255, 190, number, LIST), 0.2)
+        assert upload.due(0.2).seq == number
+    upload.take(ack, 0.3)
+    assert upload.result == "accepted"
