@@ -32,6 +32,20 @@ ORIGIN = Pose(0.0, 0.0, 0.0)
 BEARINGS = bearings()
 
 
+def box(name: str, x: float, y: float, length: float, width: float) -> Solid:
+    """A thing of half a metre's height."""
+    return Solid(name=name, shape="box", x=x, y=y, z=0.25, size=(length, width, 0.5))
+
+
+def closed_room(*things: Solid) -> WorldPlan:
+    """Five by four metres, the origin near one end."""
+    walls = (
+        box("back", -1.05, 0.0, 0.1, 4.0), box("front", 4.05, 0.0, 0.1, 4.0),
+        box("right", 1.5, -2.05, 5.2, 0.1), box("left", 1.5, 2.05, 5.2, 0.1),
+    )  # fmt: skip
+    return WorldPlan(name="room", seed=0, bounds=(-1.0, -2.0, 4.0, 2.0), solids=(*walls, *things))
+
+
 class FlatWorld:
     """Walls and things of a plan, cut at the LIDAR's height.
 
