@@ -10,6 +10,7 @@ from bluefoot_mpc.wheels.frames import moved
 from bluefoot_mpc.wheels.ready import (
     READY,
     ackermann,
+    castor,
     differential,
     forward_wheel,
     mecanum,
@@ -32,7 +33,14 @@ FIXED_AND_STEERED = WheeledRobot(
         forward_wheel("steered", 0.0, 0.1),
     ),
 )
-ROBOTS = [READY[name]() for name in READY if name != "balancing"] + [SWERVE, FIXED_AND_STEERED]
+NARROW = WheeledRobot(name="narrow", wheels=SWERVE.wheels, steering_limit=math.pi / 2)
+STIFF = WheeledRobot(name="stiff", wheels=SWERVE.wheels, steering_limit=0.3)
+PUSHED = WheeledRobot(
+    name="linked alone",
+    wheels=(forward_wheel("steered", 0.1, 0.08), forward_wheel("steered", 0.1, -0.08), castor(-0.1, 0.0)),
+    linked=((0, 1),),
+)
+ROBOTS = [READY[name]() for name in READY if name != "balancing"] + [SWERVE, NARROW, FIXED_AND_STEERED]
 DT = 0.02
 
 
@@ -42,7 +50,7 @@ def settled(drive, wanted, steps=200):
     return state
 
 
-@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+@pytest.mark.parametrize("robot", [*ROBOTS, STIFF, PUSHED], ids=lambda robot: robot.name)
 def test_every_motion_fulfils_the_wheels_constraints_within_the_limits(robot):
     rng, limits = np.random.default_rng(5), DriveLimits()
     drive = WheelDrive(robot, limits)
@@ -57,12 +65,12 @@ def test_every_motion_fulfils_the_wheels_constraints_within_the_limits(robot):
             np.testing.assert_allclose(rolled, radius_matrix(robot) @ state.wheel_speed, atol=1e-12)
             np.testing.assert_allclose(sliding_matrix(robot, state.steering) @ state.twist, 0.0, atol=1e-12)
             assert np.abs(state.wheel_speed[driven]).max() <= limits.wheel_speed * (1 + 1e-12)
+            assert np.abs(state.steering[leads]).max(initial=0) <= robot.steering_limit + 1e-8
             turned = np.abs(state.steering - before.steering)
             assert (
                 turned[list(robot.indices("steered"))].max(initial=0) <= 2 * limits.steering_rate * DT + 1e-9
             )
-            if robot is not SWERVE:
-                assert turned[leads].max(initial=0) <= limits.steering_rate * DT + 1e-9
+            assert turned[leads].max(initial=0) <= limits.steering_rate * DT + 1e-9
             mean = 0.5 * (before.wheel_speed + state.wheel_speed)
             np.testing.assert_allclose(state.wheel_angle - before.wheel_angle, DT * mean, atol=1e-12)
             before = state
@@ -71,7 +79,9 @@ def test_every_motion_fulfils_the_wheels_constraints_within_the_limits(robot):
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 def test_a_motion_that_the_robot_can_follow_is_reached_from_any_other(robot):
     rng, drive = np.random.default_rng(6), WheelDrive(robot)
-    sideways = 0.1 if robot.name in {"omni", "mecanum", "omni_steer", "two_steer", "swerve"} else 0.0
+    sideways = (
+        0.1 if robot.name in {"omni", "mecanum", "omni_steer", "two_steer", "swerve", "narrow"} else 0.0
+    )
     turning = 0.0 if robot is FIXED_AND_STEERED else 0.35
     for _ in range(6):
         signs = rng.choice([-1.0, 1.0], size=3)
@@ -110,6 +120,15 @@ def test_wheels_gain_speed_no_faster_than_their_motors_can():
     drive = WheelDrive(differential(), DriveLimits(time_constant=0.0, wheel_acceleration=10.0))
     state = drive.step(np.array([1.0, 0.0, 0.0]), DT)
     np.testing.assert_allclose(state.wheel_speed, 10.0 * DT, atol=1e-12)
+
+
+def test_wheels_that_cannot_turn_far_enough_go_as_far_as_they_can():
+    drive = WheelDrive(STIFF)
+    np.testing.assert_allclose(settled(drive, [0.1, 0.0, 0.2]).twist, [0.1, 0.0, 0.2], atol=1e-8)
+    state = settled(drive, [0.0, 0.0, 1.0])
+    assert abs(state.twist[2]) > 0.05
+    assert 0.29 < np.abs(state.steering).max() <= 0.3 + 1e-8
+    np.testing.assert_allclose(settled(drive, [0.1, 0.0, -0.2]).twist, [0.1, 0.0, -0.2], atol=1e-8)
 
 
 def test_steering_takes_its_time():
