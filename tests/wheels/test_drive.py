@@ -131,6 +131,17 @@ def test_wheels_that_cannot_turn_far_enough_go_as_far_as_they_can():
     np.testing.assert_allclose(settled(drive, [0.1, 0.0, -0.2]).twist, [0.1, 0.0, -0.2], atol=1e-8)
 
 
+@pytest.mark.parametrize(
+    "robot", [tricycle(), ackermann(), READY["two_steer"](), SWERVE], ids=lambda robot: robot.name
+)
+def test_back_along_the_same_way_needs_no_steering(robot):
+    drive, wanted, steered = WheelDrive(robot), np.array([0.1, 0.0, 0.3]), list(robot.indices("steered"))
+    ahead = settled(drive, wanted)
+    back = drive.step(-wanted, DT)
+    np.testing.assert_allclose(back.steering[steered], ahead.steering[steered], atol=1e-12)
+    np.testing.assert_allclose(settled(drive, -wanted).twist, -wanted, atol=1e-8)
+
+
 def test_steering_takes_its_time():
     drive = WheelDrive(tricycle(), DriveLimits(steering_rate=1.0))
     angles = [drive.step(np.array([0.1, 0.0, 0.625]), DT).steering[2] for _ in range(60)]
