@@ -24,6 +24,8 @@ HELP = (
 )
 TASK_GONE = 1.5
 """s after which a task that the robot does not speak of any more is over."""
+TASK_BEGINS = 15.0
+"""s that a robot gets to stand up and begin with a task."""
 _TASKS = (GuideTask.WANDER, GuideTask.APPROACH, GuideTask.FOLLOW, GuideTask.GOTO)
 _MODES = {Order.STAND: Mode.STAND, Order.WALK: Mode.WALK, Order.SIT: Mode.SIT}
 _CENTRE: Vector3 = (0.0, 0.0, 0.0)
@@ -229,6 +231,9 @@ class Operator:
             self._task_seen = now
         elif self._task_seen is not None and now - self._task_seen > TASK_GONE:
             refused = True
+        elif self._task_seen is None and now - self.state.last_input > TASK_BEGINS:
+            refused = True
+            self._link.tell(f"the robot does not begin to {guide.task}: does a script of its own lead it?")
         if refused:
             self.state = self._teleop.lead(self.state, None, now)
 

@@ -130,6 +130,7 @@ def test_tasks_have_keys_and_need_no_hand(desk, key, task):
     desk.keys.typed = [key]
     motion = desk.later()
     assert (motion.mode, motion.guide.task) == (Mode.WALK, task)
+    desk.link.picture.task = str(task)
     # The same order all the time, far beyond the dead man's time.
     assert desk.later(20.0).guide is motion.guide
     desk.keys.typed = [key]
@@ -203,6 +204,13 @@ def test_what_the_robot_has_ended_is_over(desk):
     desk.link.picture.task = ""
     assert desk.later(1.0).guide is not None
     assert desk.later(1.0).guide is None
+
+
+def test_what_the_robot_never_begins_is_over(desk):
+    desk.operator.task(3, "wander")
+    assert desk.later(14.0).guide is not None
+    assert desk.later(2.0).guide is None
+    assert "does not begin" in desk.link.told[0]
 
 
 def test_what_the_robot_refuses_is_over(desk):

@@ -4,7 +4,7 @@ import numpy as np
 import orjson
 
 from bluefoot_mpc.io.station.ground import LinkQuality
-from bluefoot_mpc.io.station.picture import RobotPicture
+from bluefoot_mpc.io.station.picture import RobotPicture, Way
 from bluefoot_mpc.viz.station_view import StationView, station_page
 
 from .html_check import PageReader
@@ -49,6 +49,20 @@ def test_texts_are_numbered_and_newest_last(robot):
     texts = StationView(robot).state(picture, GOOD)["texts"]
     assert [text["text"] for text in texts] == [f"line {number}" for number in range(10, 30)]
     assert texts[-1]["number"] == 30
+
+
+def test_how_the_robot_finds_its_way_is_shown_while_it_does(robot):
+    picture, view = RobotPicture(), StationView(robot)
+    assert view.state(picture, GOOD)["way"]["task"] == ""
+    far = Way(
+        lead="search", waypoints_left=0, clearance=np.inf, marker_age=3.0, marker=np.array([1.0, np.nan])
+    )
+    picture.task, picture.way, picture.why = "follow", far, "looking around"
+    way = view.state(picture, GOOD)["way"]
+    assert (way["task"], way["lead"], way["why"]) == ("follow", "search", "looking around")
+    assert (way["clearance"], way["markerAge"], way["marker"]) == (None, 3.0, [1.0, None])
+    picture.task = ""
+    assert view.state(picture, GOOD)["way"]["lead"] == ""
 
 
 def test_the_page_is_complete_in_itself(robot):

@@ -135,6 +135,13 @@ class MissionServer:
         self._put(np.array(upload.points))
         return [self._end(_OK, now)]
 
+    def _old_item(self, message: Any, partner: Partner, now: float) -> list[Any]:
+        """MISSION_ITEM, whose places are not exact: MAVLink has given it up, and so does the robot."""
+        if self._upload is None or self._upload.partner != partner:
+            return []
+        self._tell("waypoints refused: MISSION_ITEM came in place of MISSION_ITEM_INT; the list is as it was")
+        return [self._end(int(mavlink.MAV_MISSION_UNSUPPORTED), now)]
+
     def _refusal(self, partner: Partner, now: float) -> int:
         """The answer to an item that nobody asked for: what came of its upload, where that has just ended."""
         if self._upload is not None:
@@ -181,6 +188,7 @@ class MissionServer:
 _TAKE = {
     "MISSION_COUNT": MissionServer._count,
     "MISSION_ITEM_INT": MissionServer._item,
+    "MISSION_ITEM": MissionServer._old_item,
     "MISSION_ACK": MissionServer._cancelled,
     "MISSION_CLEAR_ALL": MissionServer._clear,
     "MISSION_REQUEST_LIST": MissionServer._list,

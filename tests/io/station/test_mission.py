@@ -164,6 +164,16 @@ def test_what_is_no_waypoint_is_refused_by_its_own_name(line, fields, result):
     assert line.hear(3.0) == []
 
 
+def test_items_of_the_old_form_are_refused(line):
+    line.tell(count(1))
+    old = mavlink.MAVLink_mission_item_message(
+        1, 1, 0, mavlink.MAV_FRAME_LOCAL_FLU, 16, 0, 1, 0, 0, 0, 0, 1, 2, 0
+    )
+    assert summary(line.tell(old)) == [("ack", mavlink.MAV_MISSION_UNSUPPORTED)]
+    assert line.points.tolist() == OLD.tolist()
+    assert line.tell(old) == []
+
+
 @pytest.mark.parametrize("number", [2, 7])
 def test_an_item_that_was_not_asked_for_ends_the_upload(line, number):
     line.tell(count(3))
