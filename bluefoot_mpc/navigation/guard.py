@@ -92,12 +92,12 @@ class Guard:
         clearance = float(distances(near, config.outline).min(initial=np.inf))
         if clearance - self._foresight.reach(now, wanted) >= config.comfortable:
             return Guarded(wanted, clearance, changed=False, stopped=False)
-        single = np.array((wanted,))
-        along = closest(near, self._foresight.places(now, single), config.outline)
-        if along.min() >= config.comfortable:
-            return Guarded(wanted, clearance, changed=False, stopped=False)
-        motions = np.concatenate((single, self._motions))
+        if clearance >= config.comfortable:
+            along = closest(near, self._foresight.place(now, wanted), config.outline)
+            if along.min() >= config.comfortable:
+                return Guarded(wanted, clearance, changed=False, stopped=False)
         near = self._thinned(near)
+        motions = np.concatenate((np.array((wanted,)), self._motions))
         along = closest(near, self._foresight.places(now, motions), config.outline)
         least = along.min(axis=1)
         cost = np.where(self._admissible(along, least, clearance), self._cost(motions, wanted, least), np.inf)
@@ -133,9 +133,9 @@ class Guard:
         count = self._config.sectors
         if len(points) <= count:
             return points
-        angle = np.arctan2(points[:, 1], points[:, 0])
-        sector = ((angle + np.pi) * (count / (2.0 * np.pi))).astype(np.intp)
-        order = np.argsort(-(points * points).sum(axis=1))
+        x, y = points.T
+        sector = ((np.arctan2(y, x) + np.pi) * (count / (2.0 * np.pi))).astype(np.intp)
+        order = (x * x + y * y).argsort()[::-1]
         last = np.full(count + 1, -1)
         last[sector[order]] = order  # the nearest is written last
         return np.asarray(points[last[last >= 0]])
@@ -143,11 +143,16 @@ class Guard:
     def _cost(self, motions: FloatArray, wanted: Motion, least: FloatArray) -> FloatArray:
         config = self._config
         x, y, turn = wanted
-        cost = config.speed_cost / config.speed_unit * np.abs(motions[:, 0] - x)
-        cost += config.side_cost / config.speed_unit * np.abs(motions[:, 1] - y)
-        cost += config.turn_cost / config.turn_unit * np.abs(motions[:, 2] - turn)
-        room = (least - config.least) / (config.comfortable - config.least)
-        return np.asarray(cost + config.near_cost * np.clip(1.0 - room, 0.0, 1.0))
+        per_unit = np.array(
+            (
+                config.speed_cost / config.speed_unit,
+                config.side_cost / config.speed_unit,
+                config.turn_cost / config.turn_unit,
+            )
+        )
+        cost = np.abs(motions - (x, y, turn)) @ per_unit
+        lack = (config.comfortable - least) / (config.comfortable - config.least)
+        return np.asarray(cost + config.near_cost * np.minimum(np.maximum(lack, 0.0), 1.0))
 
 
 def _choices() -> FloatArray:

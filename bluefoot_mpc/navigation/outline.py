@@ -38,8 +38,8 @@ class RampConfig:
     acceleration: float = 0.1  # m/s², of the gait's own ramp
     yaw_acceleration: float = 1.0  # rad/s², of the gait's own ramp
     hold: float = 0.4  # s for which a motion is kept before the robot could be stopping
-    step: float = 0.3  # s between places that are looked at
-    steps: int = 6  # places
+    step: float = 0.45  # s between places that are looked at
+    steps: int = 4  # places
 
     def __post_init__(self) -> None:
         require_positive(
@@ -86,6 +86,7 @@ class Foresight:
         ramp = np.array((config.acceleration, config.acceleration, config.yaw_acceleration))[:, None]
         self._reach = ramp * np.minimum(time, config.hold)
         self._fade = ramp * np.maximum(time - config.hold, 0.0)
+        self._steps = np.vstack((self._reach[1:], self._fade[1:])).T.tolist()
 
     def places(self, now: Motion, motions: FloatArray) -> Places:
         """The places of (k, 3) motions, m/s forward and left and rad/s, from what the gait does now."""
@@ -103,6 +104,22 @@ class Foresight:
         y = (sin * rate[:, 0] + cos * rate[:, 1]).cumsum(axis=1)
         return Places(x, y, turned)
 
+    def place(self, now: Motion, wanted: Motion) -> Places:
+        """The places of a single motion: the same sums without arrays, which takes a quarter of the time."""
+        step = self._config.step
+        x = y = yaw = 0.0
+        xs, ys, yaws = [], [], []
+        for reach, turn_reach, fade, turn_fade in self._steps:
+            vx = _ramped(now.x, wanted.x, reach, fade) * step
+            vy = _ramped(now.y, wanted.y, reach, fade) * step
+            turn = _ramped(now.yaw_rate, wanted.yaw_rate, turn_reach, turn_fade) * step
+            cos, sin = math.cos(yaw + 0.5 * turn), math.sin(yaw + 0.5 * turn)
+            x, y, yaw = x + cos * vx - sin * vy, y + sin * vx + cos * vy, yaw + turn
+            xs.append(x)
+            ys.append(y)
+            yaws.append(yaw)
+        return Places(np.array([xs]), np.array([ys]), np.array([yaws]))
+
     def reach(self, now: Motion, wanted: Motion) -> float:
         """m, more than the way of any part of the robot until it has stopped (its corners are 0.3 m out)."""
         config = self._config
@@ -112,20 +129,32 @@ class Foresight:
         return straight + 0.3 * turn * (config.hold + 0.5 * turn / config.yaw_acceleration)
 
 
+def _ramped(now: float, wanted: float, reach: float, fade: float) -> float:
+    """A rate that has gone towards the wanted one as far as `reach`, and back towards rest by `fade`."""
+    rate = now + min(max(wanted - now, -reach), reach)
+    return math.copysign(max(abs(rate) - fade, 0.0), rate)
+
+
 def closest(points: FloatArray, where: Places, outline: OutlineConfig) -> FloatArray:
     """(k, s) m from the outline at each place to the nearest of (n, 2) points; infinite without points."""
     if not len(points):
         return np.full(where.x.shape, np.inf)
-    dx = points[:, 0] - where.x[:, :, None]
-    dy = points[:, 1] - where.y[:, :, None]
-    cos, sin = np.cos(where.yaw)[:, :, None], np.sin(where.yaw)[:, :, None]
-    x = np.abs(cos * dx + sin * dy)
-    y = np.abs(cos * dy - sin * dx)
-    x -= outline.half_length
-    y -= outline.half_width
-    np.maximum(x, 0.0, out=x)
-    np.maximum(y, 0.0, out=y)
-    x *= x
-    y *= y
-    x += y
-    return np.asarray(np.sqrt(x.min(axis=2)) - outline.rounding)
+    # Single precision: half the memory, and a ten-thousandth of a millimetre is enough.
+    px, py, yaw = where.x.ravel(), where.y.ravel(), where.yaw.ravel()
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    turn = np.empty((yaw.size, 2, 2), dtype=np.float32)
+    turn[:, 0, 0] = turn[:, 1, 1] = cos
+    turn[:, 0, 1] = sin
+    turn[:, 1, 0] = -sin
+    offset = np.empty((yaw.size, 2, 1), dtype=np.float32)
+    offset[:, 0, 0] = cos * px + sin * py
+    offset[:, 1, 0] = cos * py - sin * px
+    apart = (turn.reshape(-1, 2) @ points.T.astype(np.float32)).reshape(yaw.size, 2, -1)
+    apart -= offset
+    np.abs(apart, out=apart)
+    apart -= np.array(((outline.half_length,), (outline.half_width,)), dtype=np.float32)
+    np.maximum(apart, 0.0, out=apart)
+    apart *= apart
+    least = np.sqrt((apart[:, 0] + apart[:, 1]).min(axis=1).astype(np.float64))
+    least -= outline.rounding
+    return np.asarray(least.reshape(where.x.shape))

@@ -106,6 +106,25 @@ def test_foresight_follows_the_ramps_to_a_stop() -> None:
     assert coarse.yaw[0, -1] == pytest.approx(fine.yaw[0, -1], abs=0.02)
 
 
+def test_a_single_motion_leads_where_it_leads_among_others() -> None:
+    foresight, rng = Foresight(RampConfig()), np.random.default_rng(2)
+    for _ in range(20):
+        now, wanted = (Motion(*(rng.uniform(-1.0, 1.0, 3) * (0.2, 0.06, 0.5))) for _ in range(2))
+        one, among = foresight.place(now, wanted), foresight.places(now, np.array((wanted,)))
+        np.testing.assert_allclose(np.array(one), np.array(among), atol=1e-12)
+
+
+def test_closest_equals_a_loop_over_places_and_points() -> None:
+    rng = np.random.default_rng(1)
+    points = rng.uniform(-1.0, 1.0, (30, 2))
+    where = Foresight(CONFIG.ramp).places(Motion(0.1, 0.0, 0.2), rng.uniform(-0.3, 0.3, (5, 3)))
+    found = closest(points, where, OUTLINE)
+    for k, s in np.ndindex(*where.x.shape):
+        cos, sin = math.cos(where.yaw[k, s]), math.sin(where.yaw[k, s])
+        rel = (points - (where.x[k, s], where.y[k, s])) @ np.array(((cos, -sin), (sin, cos)))
+        assert found[k, s] == pytest.approx(float(distances(rel, OUTLINE).min()), abs=1e-5)
+
+
 def test_no_part_of_the_robot_gets_farther_than_the_reach() -> None:
     foresight, rng = Foresight(CONFIG.ramp), np.random.default_rng(0)
     corners = np.array([(x, y) for x in (-0.21, 0.21) for y in (-0.21, 0.21)])
