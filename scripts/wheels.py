@@ -47,8 +47,10 @@ def main() -> int:
     parts = (constraints, robots, car, mecanum, driving, balancing, walking, equations)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        text = draw.document("Wheels and legs", LEAD, (part() for part in parts))
-        path.write_text(text, encoding="utf-8")
+        with path.open(
+            "w", encoding="utf-8"
+        ) as file:  # before the work, so that a wrong path is known at once
+            file.write(draw.document("Wheels and legs", LEAD, (part() for part in parts)))
     except BlueFootError as error:
         print(f"error: {error}", file=sys.stderr)
         return error.exit_status
