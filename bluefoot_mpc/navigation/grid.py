@@ -19,6 +19,9 @@ from bluefoot_mpc.navigation.scan import LevelScan
 from bluefoot_mpc.settings import require_positive
 from bluefoot_mpc.types import BoolArray, FloatArray
 
+_TURN = 1024
+"""Directions in a turn that the map tells apart."""
+
 OCCUPIED, MOST = 2, 8
 """Evidence from which a square counts as occupied, and the most that is gathered."""
 
@@ -58,9 +61,13 @@ class MapGrid:
         reach = round(config.sight / config.cell)
         steps = np.arange(-reach, reach + 1) * config.cell
         self._reach = reach
-        self._far = np.hypot(steps[:, None], steps[None, :])
-        self._angle = np.arctan2(steps[None, :], steps[:, None])
-        self._near = self._far <= config.visited
+        far = np.hypot(steps[:, None], steps[None, :])
+        angle = np.arctan2(steps[None, :], steps[:, None])
+        self._edge = far + 0.5 * config.cell
+        self._here = far < config.cell
+        self._near = far <= config.visited
+        self._direction = np.rint((angle + math.pi) * (_TURN / (2.0 * math.pi))).astype(np.intp) % _TURN
+        self._bearing = np.zeros(0)
         self.reset()
 
     def reset(self) -> None:
@@ -115,18 +122,24 @@ class MapGrid:
 
     def _looked_into(self, scan: LevelScan, yaw: float) -> BoolArray:
         """(m, m) True for the squares around the LIDAR that end before their ray does."""
+        if scan.bearing is not self._bearing:
+            self._take_bearings(scan.bearing)
         # The nearest of three rays: one that found no echo is no proof.
         distance = scan.distance.copy()
         np.minimum(distance[1:], scan.distance[:-1], out=distance[1:])
         np.minimum(distance[:-1], scan.distance[1:], out=distance[:-1])
-        first, last = float(scan.bearing[0]), float(scan.bearing[-1])
-        rate = (scan.bearing.size - 1) / (last - first)
-        turn = self._angle - yaw
-        turn -= 2.0 * math.pi * np.round(turn * (0.5 / math.pi))
-        ray = ((turn - first) * rate + 0.5).astype(np.intp)
-        ahead = (turn >= first) & (turn <= last)
-        reach = np.minimum(distance[np.clip(ray, 0, distance.size - 1)], self._config.sight)
-        return np.asarray((ahead & (self._far + 0.5 * self._config.cell < reach)) | (self._far < 0.1))
+        around = np.zeros(2 * _TURN)
+        around[self._ahead] = np.minimum(distance[self._ray], self._config.sight)
+        around[_TURN:] = around[:_TURN]
+        shift = round(-yaw * _TURN / (2.0 * math.pi)) % _TURN
+        return np.asarray((self._edge < around[self._direction + shift]) | self._here)
+
+    def _take_bearings(self, bearing: FloatArray) -> None:
+        """Which ray looks into each direction, and which directions none does."""
+        self._bearing = bearing
+        directions = np.arange(_TURN) * (2.0 * math.pi / _TURN) - math.pi
+        self._ahead = np.flatnonzero((directions >= bearing[0]) & (directions <= bearing[-1]))
+        self._ray = np.searchsorted(0.5 * (bearing[1:] + bearing[:-1]), directions[self._ahead])
 
     def _mark(self, scan: LevelScan, pose: Pose) -> None:
         hits = pose.to_odometry(scan.points[scan.hit & (scan.distance < self._config.sight)])
