@@ -6,6 +6,8 @@ tick, so that no tick has to do everything.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from bluefoot_mpc.model.parameters import SensorMounts
@@ -50,10 +52,15 @@ class Surroundings:
         self._pending: tuple[LevelScan, Pose] | None = None
         self._fresh: FloatArray | None = None
         self._fault = _NO_SWEEP
+        self._lost = False
 
     def step(self, frame: SensorFrame, estimate: BodyState) -> bool:
         """Take in a frame; True where it brought a usable sweep."""
-        self.pose = pose_of(estimate)
+        pose = pose_of(estimate)
+        self._lost = not all(map(math.isfinite, pose))
+        if self._lost:
+            return False
+        self.pose = pose
         self._history.add(estimate)
         return frame.lidar is not None and self._take(frame.lidar)
 
@@ -73,6 +80,8 @@ class Surroundings:
 
     def blind(self, time: float) -> str:
         """Why the robot cannot see at a time (s); empty while it can."""
+        if self._lost:
+            return "the estimated place of the robot is not a number"
         if self.scan is None:
             return self._fault
         age = time - self.scan.time

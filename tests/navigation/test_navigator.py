@@ -146,6 +146,18 @@ def test_a_frozen_sweep_counts_as_none() -> None:
     assert decision.report.guided is Guided.BLIND
 
 
+def test_a_place_that_is_no_number_leaves_it_blind() -> None:
+    nav = navigator()
+    run(nav, ROOM, 0.0, 1.0)
+    for tick in range(50, 60):
+        time = tick * PERIOD
+        state = body_state(time, x=math.nan)
+        decision = nav.step(WANDER, sensor_frame(time, replace(ROOM, time=time)), state, PERIOD)
+        assert decision.report.guided is Guided.BLIND
+        assert not moves(decision)
+    assert moves(run(nav, ROOM, 1.2, 1.0))
+
+
 def test_reset_gives_back_the_state_after_the_start() -> None:
     plan, nav = make_plan("room", 201), navigator()
     first = Bench(plan, nav, seed=5).ride(WANDER, 6.0)
