@@ -12,6 +12,8 @@ HEAVY = ("mujoco", "matplotlib", "plotly", "meshcat", "serial")
 WITHOUT_SIMULATOR = (
     "runtime",
     "control",
+    "navigation",
+    "wheels",
     "estimation",
     "gait",
     "zmp",
