@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bluefoot_mpc.runtime.data import RunData
+from bluefoot_mpc.runtime.pictures import FIRST_SEEN, LOST, MARKER_LOST, SEEN_AGAIN
 from bluefoot_mpc.viz.guided_series import GuidedSeries
 from bluefoot_mpc.viz.style import GUIDED_NAMES
 from bluefoot_mpc.viz.verdict import Tile, number
@@ -50,8 +51,9 @@ def way_tiles(summary: Mapping[str, Any], checks: Sequence[Mapping[str, Any]] = 
 
 
 def way_events(run: RunData, guided: GuidedSeries) -> list[tuple[float, str]]:
-    """Time (s) and text of what happened on the way: changes of what leads, and what was touched."""
+    """Time (s) and text of what happened on the way: what leads, what was touched, marker seen and lost."""
     found = [(time, f"touches {', '.join(names)}") for time, names in guided.collisions]
+    found += _sightings(guided)
     before = ""
     for k, name in enumerate(guided.guided):
         if name and name != before:
@@ -60,4 +62,20 @@ def way_events(run: RunData, guided: GuidedSeries) -> list[tuple[float, str]]:
             text = f"led by: {GUIDED_NAMES.get(name, name)}"
             found.append((float(guided.time[k]), f"{text} ({reason})" if reason else text))
         before = name
+    return found
+
+
+def _sightings(guided: GuidedSeries) -> list[tuple[float, str]]:
+    """Time (s) and text of each time that the marker came into view, and was out of it for a while."""
+    found: list[tuple[float, str]] = []
+    has_seen = is_lost = False
+    for k in np.flatnonzero(guided.reports):
+        time = float(guided.time[k])
+        if guided.in_view[k]:
+            if not has_seen or is_lost:
+                found.append((time, SEEN_AGAIN if has_seen else FIRST_SEEN))
+            has_seen, is_lost = True, False
+        elif has_seen and not is_lost and guided.marker_age[k] > LOST:
+            is_lost = True
+            found.append((time, MARKER_LOST))
     return found
