@@ -137,13 +137,11 @@ def _marker_and_leader(guided: GuidedSeries, plan: WorldPlan | None) -> list[Tra
     elif plan is not None and plan.marker is not None:
         disc = {"symbol": "circle", "size": 13, "color": MARKER, "line": {"color": "@card", "width": 2}}
         traces.append(_points([plan.marker.x], [plan.marker.y], "marker", disc))
-    else:
-        traces += _believed_marker(guided)
-    return traces
+    return traces if guided.has_leader else [*traces, *_believed_marker(guided)]
 
 
 def _believed_marker(guided: GuidedSeries) -> list[Trace]:
-    """Where a marker that nothing but the robot knows of was last seen."""
+    """Where the robot believes a marker that stands: in the odometry frame, as last seen."""
     known = np.flatnonzero(np.isfinite(guided.marker_estimate[:, 0]))
     if not len(known):
         return []
