@@ -31,8 +31,8 @@ OUTSIDE = 1.25
 """Of the angular radius: where it should not be; else something of the same colour is behind."""
 SMALL = 8.0
 """Pixels of radius below which a square is nearly a circle, and more of the edge must fit."""
-WHOLE = 0.6
-"""Share of an outline in sight below which it must be twice as large for that."""
+WHOLE = 0.85
+"""Share of an outline in sight below which it must be half as large again: few pixels' arc has any radius."""
 SMALL_SUPPORT = 0.85
 """Share of a small outline in sight on which an edge must fit."""
 REWEIGHTED = 3
@@ -272,8 +272,10 @@ def _judged(rim: Rim, limits: Limits) -> Cone | None:
     merged = float(rim.coloured((OUTSIDE,))[edge.seen].mean()) > 0.2
     residual = float(distance[fits].mean())
     least = limits.least_merged_support if merged else limits.least_support
-    if cone.angle < (SMALL if arc > WHOLE else 2.0 * SMALL) * rim.pixel:
+    if cone.angle < SMALL * rim.pixel:
         least = max(least, SMALL_SUPPORT)
+    if arc < WHOLE and cone.angle < 1.5 * SMALL * rim.pixel:
+        return None
     if support < least:
         return None
     if residual > max(limits.greatest_residual * cone.angle, 0.4 * rim.pixel):

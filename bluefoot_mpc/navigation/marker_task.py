@@ -20,13 +20,12 @@ from bluefoot_mpc.types import BodyState, CameraImage, FloatArray, Guide, Guided
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class MarkerTaskConfig:
-    """Configuration of the parts, and how long one missed picture does not matter."""
+    """Configuration of the parts, and how a marker that stands is gone to."""
 
     finder: MarkerConfig = field(default_factory=MarkerConfig)
     target: TargetConfig = field(default_factory=TargetConfig)
     servoing: ServoingConfig = field(default_factory=ServoingConfig)
     search: SearchConfig = field(default_factory=SearchConfig)
-    blink: float = 0.5  # s without a sighting for which the camera goes on leading
     remember: float = 90.0  # s for which a marker that stands is gone to without a sighting
     remember_beyond: float = 0.5  # m more than the wanted distance: nearer it must be in view
     detour: float = 1.15  # times the straight line: a longer way is one around something
@@ -34,8 +33,7 @@ class MarkerTaskConfig:
 
     def __post_init__(self) -> None:
         require_positive(
-            blink=self.blink, remember=self.remember, remember_beyond=self.remember_beyond,
-            detour_least=self.detour_least,
+            remember=self.remember, remember_beyond=self.remember_beyond, detour_least=self.detour_least
         )  # fmt: skip
         require_range(1.0, 10.0, detour=self.detour)
 
@@ -51,7 +49,7 @@ class MarkerWish:
     Attributes:
         guided: MARKER while it leads, ARRIVED while the robot stands at its distance, SEARCH otherwise.
         motion: m/s and rad/s, heading frame.
-        share: of `motion` in the command, 0..1.
+        share: of `motion` in the command, 0..1; that of its prediction where the marker is hidden shortly.
         goal: (2,) m in the odometry frame; None without one.
         pitch: rad, of the trunk, nose down positive.
         mixing: the camera's share for the report: κ, and 0 while the marker is not seen.
@@ -124,11 +122,10 @@ class MarkerTask:
         return self._seek(estimate)
 
     def _leads(self, guide: Guide, estimate: BodyState) -> bool:
-        """True while the marker is in view, or stands somewhere farther off where it has been seen."""
-        age = self._target.age(estimate.time)
-        if age <= self._config.blink:
+        """True while the marker is in view or predicted, or stands farther off where it has been seen."""
+        if self._target.trusted(estimate.time):
             return True
-        if guide.task is GuideTask.FOLLOW or age > self._config.remember:
+        if guide.task is GuideTask.FOLLOW or self._target.age(estimate.time) > self._config.remember:
             return False
         relative = self._target.relative(estimate)
         return relative is not None and relative.distance > guide.distance + self._config.remember_beyond
@@ -149,17 +146,18 @@ class MarkerTask:
         return self._target.expected(image.time, self._mounts.focal_length(width), (width, height))
 
     def _lead(self, guide: Guide, estimate: BodyState) -> MarkerWish:
-        """The marker is in view: towards it, or stand."""
+        """Towards the marker, seen or predicted, or stand."""
         config = self._config.servoing
         relative = self._target.relative(estimate)
         if relative is None:
             return self._seek(estimate)
         law = servoing.follow if guide.task is GuideTask.FOLLOW else servoing.approach
         self._servo, motion = law(self._servo, relative, guide.distance, guide.speed, config)
-        # The radius that the marker has at this distance: a missed picture does not change who leads.
+        # The radius that the marker has at this distance: a moment without a sighting, for which its place
+        # is predicted, does not change who leads. The report's share is zero then.
         radius = self._ball_focal / max(relative.distance, 0.05)
-        in_view = self._target.age(estimate.time) <= self._config.blink
-        share = servoing.mixing(radius if in_view else 0.0, config)
+        near = self._target.trusted(estimate.time)
+        share = servoing.mixing(radius if near else 0.0, config)
         if self._servo.standing:
             share = 1.0
         goal = self._stand_off(estimate, guide.distance)
@@ -169,8 +167,9 @@ class MarkerTask:
 
     def _seek(self, estimate: BodyState) -> MarkerWish:
         """The marker is not in view: look for it, first where it should be."""
-        place = self._target.position_at(estimate.time) if self._target.known else None
-        wish = self._search.step(estimate, place)
+        relative = self._target.relative(estimate)
+        place = None if relative is None else self._target.position_at(estimate.time)
+        wish = self._search.step(estimate, place, 0.0 if relative is None else relative.across)
         self._reason = str(wish.phase)
         if wish.phase is Phase.WANDER:
             self._target.forget()

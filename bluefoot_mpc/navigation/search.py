@@ -11,6 +11,9 @@ from bluefoot_mpc.navigation.limits import Motion
 from bluefoot_mpc.settings import require_positive, require_range
 from bluefoot_mpc.types import BodyState, FloatArray
 
+MOVES = 0.01
+"""m/s across the line of sight; slower, a marker has no side to which it went."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SearchConfig:
@@ -82,14 +85,17 @@ class Search:
         self._sense = 1.0
         self._walked = 0.0
         self._place = (0.0, 0.0)
+        self._drift = 0.0
 
-    def step(self, estimate: BodyState, lost: FloatArray | None) -> SearchWish:
+    def step(self, estimate: BodyState, lost: FloatArray | None, drift: float = 0.0) -> SearchWish:
         """One tick.
 
         Args:
             estimate: where the robot is.
             lost: (3,) or (2,) m in the odometry frame, where the marker is supposed to be; None unknown.
+            drift: m/s, to the left across the line of sight, of the marker when it was lost.
         """
+        self._drift = drift
         if self._phase is None:
             self._enter(Phase.LOOK if lost is None else Phase.TURN, estimate, lost)
         self._track(estimate)
@@ -111,8 +117,9 @@ class Search:
         self._yaw = float(estimate.rpy[2])
         self._place = (float(estimate.position[0]), float(estimate.position[1]))
         if lost is not None:
-            # The marker left the view to that side: it is more likely there than behind.
-            self._sense = 1.0 if _bearing(estimate, lost) >= 0.0 else -1.0
+            # It went to that side, or left the view there: it is more likely there than behind.
+            ahead = phase is Phase.LOOK and abs(self._drift) > MOVES
+            self._sense = math.copysign(1.0, self._drift if ahead else _bearing(estimate, lost))
 
     def _track(self, estimate: BodyState) -> None:
         yaw = float(estimate.rpy[2])

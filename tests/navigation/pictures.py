@@ -61,7 +61,7 @@ def drawn(shot: Shot, rng: np.random.Generator | None = None, time: float = 0.0)
         _fill(canvas, box, colour)
     values = 255.0 * shot.exposure * canvas
     if rng is not None:
-        values += rng.normal(0.0, 2.0, values.shape)
+        values += rng.integers(-3, 4, values.shape, dtype=np.int8)  # grain of two levels
     return CameraImage(time=time, pixels=np.clip(values + 0.5, 0, 255).astype(np.uint8), valid=True)
 
 
