@@ -21,7 +21,7 @@ from bluefoot_mpc.viz.series import RunSeries, extract
 from bluefoot_mpc.viz.stage_motion import replay_data
 from bluefoot_mpc.viz.style import BAD, NEUTRAL
 from bluefoot_mpc.viz.verdict import facts, number, tiles, verdict
-from bluefoot_mpc.viz.verdict_way import way_events, way_tiles
+from bluefoot_mpc.viz.verdict_way import NAVIGATION, way_events, way_tiles
 
 SERVO_TEMPERATURE_LIMIT = 70.0
 """°C at which an AX-12A switches itself off (its control table's default)."""
@@ -147,7 +147,8 @@ def _marks(series: RunSeries) -> list[dict[str, Any]]:
 def _events(series: RunSeries, on_the_way: Sequence[tuple[float, str]]) -> dict[str, Any]:
     """Events with equal ones in a row put together, and a caption that tells what was left out."""
     grouped: list[dict[str, Any]] = []
-    for time, text in sorted([*_with_pushes(series), *on_the_way], key=lambda event: event[0]):
+    told = [event for event in _with_pushes(series) if not (on_the_way and event[1].startswith(NAVIGATION))]
+    for time, text in sorted([*told, *on_the_way], key=lambda event: event[0]):
         last = next((group for group in reversed(grouped[-4:]) if group["text"] == text), None)
         if last is not None and time - last["end"] < 0.5:
             last.update(end=time, count=last["count"] + 1)

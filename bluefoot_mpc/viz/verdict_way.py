@@ -27,6 +27,10 @@ _FIGURES = (
 """Figures of the summary: key, label, digits, unit and what is measured."""
 
 
+NAVIGATION = "navigation: "
+"""Start of what the controller itself tells of its way; `way_events` tells more."""
+
+
 def way_tiles(summary: Mapping[str, Any], checks: Sequence[Mapping[str, Any]] = ()) -> list[Tile]:
     """Key figures of finding the way; those that a run does not have are left out.
 
