@@ -105,7 +105,7 @@ def _seen_floor(run: RunData, n: int, plan: WorldPlan, mount: FloatArray) -> lis
             "colorscale": [[0.0, "rgba(217,154,0,0.22)"], [1.0, "rgba(18,161,124,0.13)"]],
             "showscale": False,
             "hoverinfo": "skip",
-            "name": f"floor seen, {100.0 * coverage.fraction:.0f} %",
+            "name": f"floor seen, {100.0 * coverage.fraction:.0f} % (amber: not)",
             "showlegend": True,
         }
     ]
