@@ -23,6 +23,8 @@ PER_EVENT = 4
 """Most pictures of one kind of event: half of them the first ones, the rest the last ones."""
 WIDTH = 320
 """Pixels, about the width that pictures are shrunk to."""
+_LEAST_SIDE = 16
+"""Pixels, each way: a smaller picture shows nothing."""
 LOST = 1.0
 """s that the marker must be out of view until it counts as lost."""
 
@@ -74,7 +76,7 @@ class PictureBook:
             frame: the tick's frame, its picture included.
             telemetry: what the controller made of it.
         """
-        if frame.camera is not None and frame.camera.valid:
+        if frame.camera is not None and frame.camera.valid and is_picture(frame.camera.pixels):
             self._newest = frame.camera
             self._marker = _UNSEEN if telemetry.navigation is None else telemetry.navigation.marker
             self._keep_for_time(telemetry.time)
@@ -132,6 +134,13 @@ class PictureBook:
             raise RuntimeError("there is no picture to shrink yet")
         pixels, side = shrink(image.pixels)
         return KeptPicture(time=time, pixels=pixels, shrunk=side, marker=self._marker.copy(), event=event)
+
+
+def is_picture(pixels: object) -> bool:
+    """True of an array of bytes (height, width, 3): whatever a camera gives, the run goes on."""
+    if not isinstance(pixels, np.ndarray) or pixels.dtype != np.uint8:
+        return False
+    return pixels.ndim == 3 and pixels.shape[2] == 3 and min(pixels.shape[:2]) >= _LEAST_SIDE
 
 
 def shrink(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int]:

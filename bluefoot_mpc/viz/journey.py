@@ -19,7 +19,7 @@ from bluefoot_mpc.viz.plots_field import field_pictures, navigation_config
 from bluefoot_mpc.viz.plots_map import world_map
 from bluefoot_mpc.viz.plots_marker import distances, in_picture
 from bluefoot_mpc.viz.plots_way import way_over_time
-from bluefoot_mpc.viz.scans import cloud, known_plan, read_scans
+from bluefoot_mpc.viz.scans import cloud, is_usable, known_plan, read_scans
 from bluefoot_mpc.viz.series import RunSeries
 
 _MOST_SCANS = 1500
@@ -90,7 +90,7 @@ def _seen_floor(run: RunData, n: int, plan: WorldPlan, mount: FloatArray) -> lis
     if not grid.floor.any():
         return []
     for frame, truth in zip(run.frames[:n], run.truth[:n], strict=True):
-        if frame.lidar is not None:
+        if is_usable(frame.lidar):
             coverage.add(lidar_pose(truth.q, mount), frame.lidar)
     rows, columns = grid.floor.shape
     shown = np.where(grid.floor, coverage.seen, np.nan)

@@ -9,6 +9,7 @@ import numpy as np
 from bluefoot_mpc.geometry import rotation_from_quaternion
 from bluefoot_mpc.types import FloatArray, LidarScan, Telemetry, TruthSample
 from bluefoot_mpc.viz.packing import stride_for
+from bluefoot_mpc.viz.scans import is_usable
 from bluefoot_mpc.viz.series import estimated_q
 from bluefoot_mpc.viz.stage import Stage, wheel_steering
 from bluefoot_mpc.viz.stage_motion import RAYS
@@ -34,7 +35,7 @@ class LiveSurroundings:
 
     def note(self, telemetry: Telemetry, truth: TruthSample | None, scan: LidarScan | None) -> None:
         """Take in a tick; returns at once."""
-        if scan is not None and scan.valid:
+        if is_usable(scan):
             self._sweep = (estimated_q(telemetry) if truth is None else truth.q, scan)
         if truth is None or self._wheeled is None:
             return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from typing import TypeGuard
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.sim.worlds import footprint
 from bluefoot_mpc.sim.worlds.coverage import LIDAR_HEIGHT, lidar_pose
 from bluefoot_mpc.sim.worlds.plan import WorldPlan
-from bluefoot_mpc.types import FloatArray
+from bluefoot_mpc.types import FloatArray, LidarScan
 from bluefoot_mpc.viz.surroundings import plan_of
 
 _LOG = logging.getLogger(__name__)
@@ -40,6 +41,13 @@ class ReadScan:
 
     tick: int
     scan: LevelScan
+
+
+def is_usable(scan: LidarScan | None) -> TypeGuard[LidarScan]:
+    """True of a sweep that can be drawn: one distance for each bearing, and any at all."""
+    if scan is None or not scan.valid:
+        return False
+    return scan.bearing.ndim == 1 and scan.bearing.shape == scan.distance.shape and len(scan.bearing) > 0
 
 
 def read_scans(
@@ -100,7 +108,7 @@ def plan_fits(plan: WorldPlan, run: RunData, mounts: SensorMounts) -> bool:
 def _ends(run: RunData, tick: int, mounts: SensorMounts) -> FloatArray:
     """(m, 3) m in world: x and y of what a sweep truly met but marker and leader, and how far away it was."""
     truth, sweep = run.truth[tick], run.frames[tick].lidar
-    if sweep is None or not sweep.valid:
+    if not is_usable(sweep):
         return np.zeros((0, 3))
     x, y, yaw = lidar_pose(truth.q, np.asarray(mounts.lidar)).tolist()
     met = np.isfinite(sweep.distance) & (sweep.distance > ScanConfig().least_range)

@@ -14,7 +14,7 @@ from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.types import FloatArray, LidarScan
 from bluefoot_mpc.viz.animation import animation_data
 from bluefoot_mpc.viz.packing import pack, stride_for
-from bluefoot_mpc.viz.scans import known_plan
+from bluefoot_mpc.viz.scans import is_usable, known_plan
 from bluefoot_mpc.viz.scene import build_scene
 from bluefoot_mpc.viz.series import RunSeries
 from bluefoot_mpc.viz.stage import Stage, stage_data, stage_of, wheel_angles, wheel_steering
@@ -81,13 +81,13 @@ def _leader(run: RunData, series: RunSeries, kind: str) -> dict[str, Any]:
 
 def _sweeps(run: RunData, series: RunSeries, mount: Sequence[float]) -> dict[str, Any] | None:
     """Distances of a part of the rays of a part of the sweeps; None without any."""
-    scans = [f.lidar for f in run.frames[: len(series.time)] if f.lidar is not None and f.lidar.valid]
+    scans = [frame.lidar for frame in run.frames[: len(series.time)] if is_usable(frame.lidar)]
     if not scans:
         return None
     start = run.telemetry[0].time
     # All sweeps of a device have the same rays; one that differs is left out.
     rays = len(scans[0].bearing)
-    scans = [scan for scan in scans if len(scan.bearing) == len(scan.distance) == rays]
+    scans = [scan for scan in scans if len(scan.bearing) == rays]
     scans = scans[:: stride_for(len(scans), MAX_SWEEPS)]
     every = stride_for(rays, RAYS)
     millimetres = np.array([to_millimetres(scan, every) for scan in scans])

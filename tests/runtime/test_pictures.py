@@ -113,6 +113,33 @@ def test_invalid_pictures_and_runs_without_any_keep_nothing() -> None:
     assert run.book.pictures() == ()
 
 
+@pytest.mark.parametrize(
+    "pixels",
+    [
+        np.zeros((480, 640), np.uint8),
+        np.zeros((480, 640, 4), np.uint8),
+        np.zeros((480, 640, 3), np.float64),
+        np.zeros((0, 0, 3), np.uint8),
+        np.zeros((3, 5000, 3), np.uint8),
+        None,
+    ],
+)
+def test_what_is_no_picture_is_not_kept(pixels: object) -> None:
+    run = Run()
+    frame, telemetry = run.next(report(300.0))
+    run.book.keep(
+        dataclasses.replace(frame, camera=CameraImage(time=0.0, pixels=pixels, valid=True)), telemetry
+    )  # type: ignore[arg-type]
+    assert len(run.book) == 0
+
+
+@pytest.mark.parametrize("shape", [(16, 16, 3), (17, 8000, 3), (1080, 1920, 3)])
+def test_pictures_of_any_size_shrink(shape: tuple[int, int, int]) -> None:
+    small, side = shrink(np.full(shape, 77, np.uint8))
+    assert (small == 77).all()
+    assert small.shape == (shape[0] // side, shape[1] // side, 3)
+
+
 def test_a_run_keeps_pictures() -> None:
     data, run = RunData(), Run()
     data.keep_picture(*run.next(report(300.0)))

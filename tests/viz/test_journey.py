@@ -361,3 +361,20 @@ def decode(source: str) -> np.ndarray[Any, Any]:
     image = cv2.imdecode(np.frombuffer(base64.b64decode(data), np.uint8), cv2.IMREAD_COLOR)
     assert image is not None
     return np.asarray(image[:, :, ::-1])
+
+
+def test_bad_sweeps_do_not_spoil_the_report(guided_run: RunData, robot: RobotModel) -> None:
+    frames = list(guided_run.frames)
+    good = frames[5].lidar
+    assert good is not None
+    bad = [
+        dataclasses.replace(good, distance=good.distance[:100]),
+        dataclasses.replace(good, bearing=np.zeros(0), distance=np.zeros(0)),
+        dataclasses.replace(good, distance=np.full_like(good.distance, np.nan)),
+        dataclasses.replace(good, bearing=good.bearing[:341], distance=good.distance[:341]),
+        dataclasses.replace(good, valid=False),
+    ]
+    for k in range(100):
+        frames[5 * k] = dataclasses.replace(frames[5 * k], lidar=bad[k % len(bad)])
+    page = read_page(report_html(dataclasses.replace(guided_run, frames=frames), make_summary(), robot))
+    assert set(PANELS) <= set(page.ids)

@@ -109,3 +109,19 @@ def test_every_leader_can_be_drawn(robot: RobotModel) -> None:
         paths = {command["path"] for command in data["surroundings"]}
         wheels = {f"/meshcat/leader/wheels/wheel{k}/shapes" for k in range(len(READY[kind]().wheels))}
         assert wheels | {"/meshcat/leader/frame/shapes", "/meshcat/world/things"} <= paths
+
+
+def test_sweeps_that_cannot_be_drawn_are_left_out(guided_run: RunData, robot: RobotModel) -> None:
+    around = surroundings(robot)
+    lidar = guided_run.frames[0].lidar
+    assert lidar is not None
+    for bad in (
+        dataclasses.replace(lidar, valid=False),
+        dataclasses.replace(lidar, distance=lidar.distance[:-1]),
+        dataclasses.replace(lidar, bearing=np.zeros(0), distance=np.zeros(0)),
+    ):
+        around.note(guided_run.telemetry[0], guided_run.truth[0], bad)
+        assert "sweep" not in around.state(guided_run.telemetry[0], guided_run.truth[0])
+    nothing = dataclasses.replace(lidar, distance=np.full_like(lidar.distance, np.nan))
+    around.note(guided_run.telemetry[0], guided_run.truth[0], nothing)
+    assert around.state(guided_run.telemetry[0], guided_run.truth[0])["sweep"] == []
