@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -68,19 +68,18 @@ def journey_of(run: RunData, series: RunSeries, robot: RobotModel) -> Journey | 
     scans = read_scans(run, n, mounts, config.scan, most=_MOST_SCANS)
     pictures = kept_pictures(run)
     seen = _seen_floor(run, n, plan, np.asarray(mounts.lidar)) if plan is not None and run.truth else []
-    panels: list[Panel | None] = [
+    overview, field = (
         world_map(series, guided, plan, cloud(run, scans, _MOST_POINTS), seen),
         field_pictures(guided, scans, config),
-    ]
+    )
+    panels = [replace(overview, wide=True)] if field is None else [overview, field]
     if guided.reports.any():
         panels.append(way_over_time(series, guided, run.period))
     if guided.looks_for_a_marker:
         width = pictures[0].pixels.shape[1] * pictures[0].shrunk if pictures else 0
         panels += [in_picture(guided, width), distances(guided, run.period)]
     strip = camera_strip(pictures, guided, mounts.camera_view_deg, run.telemetry[0].time)
-    return Journey(
-        guided=guided, plan=plan, panels=tuple(panel for panel in panels if panel), strip=tuple(strip)
-    )
+    return Journey(guided=guided, plan=plan, panels=tuple(panels), strip=tuple(strip))
 
 
 def _seen_floor(run: RunData, n: int, plan: WorldPlan, mount: FloatArray) -> list[Trace]:

@@ -18,6 +18,8 @@ from bluefoot_mpc.viz.style import BAD, GUIDED_COLOURS, GUIDED_NAMES, LEADER, MA
 from bluefoot_mpc.viz.surroundings import css_colour, hangs_over, outline
 
 _TOLD = "no task"
+_LEAST_SIDE = 2.0
+"""m that a map shows at least, each way."""
 _EDGE = 0.3
 """m around the drawn things."""
 
@@ -194,6 +196,8 @@ def _layout(guided: GuidedSeries, plan: WorldPlan | None, cloud: FloatArray) -> 
         shown += [np.reshape(plan.bounds, (2, 2)), *(outline(solid) for solid in plan.solids)]
     points = np.concatenate(shown)
     low, high = np.nanmin(points, axis=0) - _EDGE, np.nanmax(points, axis=0) + _EDGE
+    more = np.maximum(0.0, 0.5 * (_LEAST_SIDE - (high - low)))
+    low, high = low - more, high + more
     return {
         "xaxis": {"title": {"text": "x, forward at the start (m)"}, "range": [low[0], high[0]]},
         "yaxis": {
