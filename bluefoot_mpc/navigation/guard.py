@@ -26,11 +26,11 @@ class GuardConfig:
     """Distances to keep, and how motions are weighed against each other."""
 
     least: float = 0.13  # m from the outline that no motion goes below
-    comfortable: float = 0.25  # m; nearer costs
+    comfortable: float = 0.20  # m; nearer costs
     away: float = 0.005  # m that a robot which is too near must gain by a motion
     slack: float = 0.004  # m that it may lose on the way
     reach: float = 1.0  # m around the robot from which points are looked at
-    sectors: int = 72  # around the robot; of each the nearest point counts
+    sectors: int = 54  # around the robot; of each the nearest point counts
     speed_cost: float = 1.0  # of a difference of `speed_unit`
     speed_unit: float = 0.1  # m/s
     turn_cost: float = 1.0  # of a difference of `turn_unit`
@@ -157,7 +157,7 @@ class Guard:
 
 def _choices() -> FloatArray:
     """(k, 3) motions to choose from: arcs, turns in place, backing off, side steps, standing."""
-    speeds, turns = (-0.06, 0.0, 0.04, 0.08, 0.12, 0.16), (-0.45, -0.3, -0.15, 0.0, 0.15, 0.3, 0.45)
+    speeds, turns = (-0.06, 0.0, 0.05, 0.10, 0.16), (-0.45, -0.3, -0.15, 0.0, 0.15, 0.3, 0.45)
     arcs = [(x, 0.0, turn) for x, turn in itertools.product(speeds, turns)]
     sides = [(x, y, 0.0) for x, y in itertools.product((-0.03, 0.0, 0.04), (-0.05, 0.05))]
     return np.array(arcs + sides)

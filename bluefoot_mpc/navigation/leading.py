@@ -151,7 +151,7 @@ class Leading:
         if far <= config.glide:
             return route.gliding_to(place, speed, config)
         if not len(way):
-            return Motion()
+            return Motion(0.0, 0.0, config.look_rate)  # what has gone meanwhile may be behind
         slow = min(speed, config.glide_gain * far)
         return self._along(way, slow, around)
 

@@ -25,12 +25,14 @@ class RouteConfig:
     yaw_gain: float = 1.2  # 1/s, turn for an error of the direction
     turn_first_deg: float = 60.0  # degrees off the direction from which the robot turns in place
     yaw_rate: float = 0.5  # rad/s, at most
+    look_rate: float = 0.4  # rad/s, looking around where no way is known
     glide: float = 0.3  # m to the goal, within which the robot steps towards it without turning
     glide_gain: float = 0.8  # 1/s, speed for the distance there
 
     def __post_init__(self) -> None:
         require_positive(
-            lookahead=self.lookahead, yaw_gain=self.yaw_gain, yaw_rate=self.yaw_rate, glide=self.glide,
+            lookahead=self.lookahead, yaw_gain=self.yaw_gain, yaw_rate=self.yaw_rate,
+            look_rate=self.look_rate, glide=self.glide,
             glide_gain=self.glide_gain,
         )  # fmt: skip
         require_range(0.0, 1.0, share=self.share)

@@ -18,9 +18,9 @@ from bluefoot_mpc.types import FloatArray
 class WaypointConfig:
     """When a waypoint counts as reached, and when it is given up."""
 
-    reached: float = 0.10  # m
+    reached: float = 0.08  # m
     every: float = 1.0  # s between searches for the way
-    blocked: float = 6.0  # s without a way until a waypoint is given up
+    blocked: float = 10.0  # s without a way until a waypoint is given up
     grace: float = 20.0  # s, besides the time that the way should take ...
     slowness: float = 3.0  # ... times this
 

@@ -28,7 +28,7 @@ from tests.navigation.bench import (
 WANDER = Guide(task=GuideTask.WANDER, speed=0.2)
 ROOM = LidarScan(time=0.0, bearing=BEARINGS, distance=np.full(BEARINGS.size, 2.0), valid=True)
 DEAD_END = (
-    box("one", 1.0, 0.55, 3.0, 0.1), box("other", 1.0, -0.55, 3.0, 0.1), box("end", 2.55, 0.0, 0.1, 1.2)
+    box("one", 1.35, 0.55, 2.3, 0.1), box("other", 1.35, -0.55, 2.3, 0.1), box("end", 2.55, 0.0, 0.1, 1.2)
 )  # fmt: skip
 """A passage a metre wide, that ends."""
 
@@ -72,7 +72,7 @@ def test_out_of_a_dead_end() -> None:
     bench = Bench(plan, navigator(), seed=2, start=Pose(2.0, 0.0, 0.0))
     ride = bench.ride(WANDER, 40.0)
     assert ride.clearance >= 0.10
-    assert ride.path[:, 0].min() < -0.5
+    assert ride.path[:, 0].min() < 0.2
     assert ride.still <= 10.0
 
 
