@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bluefoot_mpc.exceptions import BlueFootError
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.runtime.pictures import KeptPicture, PictureBook
+from bluefoot_mpc.types import Guided
 from bluefoot_mpc.viz.guided_series import GuidedSeries
 from bluefoot_mpc.viz.style import GUIDED_NAMES
 from bluefoot_mpc.viz.verdict import number
@@ -21,6 +22,7 @@ MOST = 12
 """Pictures in the report."""
 _EVENTS = 6
 """Pictures of events among them, at most, if others are there to show the rest of the run."""
+_REST = str(Guided.ARRIVED)
 _QUALITY = 82  # of JPEG, 0..100
 
 
@@ -82,7 +84,10 @@ def camera_strip(
         view_deg: degrees from the left edge of a picture to its right edge.
         start: s, time of the first tick.
     """
-    return [_overlay(picture, guided, view_deg, start) for picture in choose(pictures)]
+    rests = [picture for picture in pictures if not picture.event and _led(guided, picture, start) == _REST]
+    # A robot that has arrived stands, and one picture of it is like the other: the last will do.
+    shown = [picture for picture in pictures if picture not in rests[:-1]]
+    return [_overlay(picture, guided, view_deg, start) for picture in choose(shown)]
 
 
 def choose(pictures: Sequence[KeptPicture]) -> list[KeptPicture]:
@@ -111,7 +116,7 @@ def _spread(pictures: Sequence[KeptPicture], count: int) -> list[KeptPicture]:
 
 def _overlay(picture: KeptPicture, guided: GuidedSeries, view_deg: float, start: float) -> Overlay:
     height, width = (picture.shrunk * side for side in picture.pixels.shape[:2])
-    tick = int(np.argmin(np.abs(guided.time - (picture.time - start))))
+    tick = _tick(guided, picture, start)
     is_found = bool(np.isfinite(picture.marker).all())
     column, row, radius = (float(x) for x in picture.marker) if is_found else (None, None, None)
     bearing = "" if column is None else _bearing(column, width, view_deg)
@@ -122,6 +127,14 @@ def _overlay(picture: KeptPicture, guided: GuidedSeries, view_deg: float, start:
         distance=_distance(guided, tick) if is_found else "",
         label=picture.event or GUIDED_NAMES.get(led, led) or "no task", is_event=bool(picture.event),
     )  # fmt: skip
+
+
+def _tick(guided: GuidedSeries, picture: KeptPicture, start: float) -> int:
+    return int(np.argmin(np.abs(guided.time - (picture.time - start))))
+
+
+def _led(guided: GuidedSeries, picture: KeptPicture, start: float) -> str:
+    return guided.guided[_tick(guided, picture, start)]
 
 
 def _bearing(column: float, width: int, view_deg: float) -> str:

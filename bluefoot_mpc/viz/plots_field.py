@@ -13,7 +13,7 @@ from bluefoot_mpc.navigation import potential_field
 from bluefoot_mpc.navigation.config import NavigationConfig
 from bluefoot_mpc.navigation.outline import OutlineConfig
 from bluefoot_mpc.settings import build
-from bluefoot_mpc.types import FloatArray
+from bluefoot_mpc.types import FloatArray, Guided
 from bluefoot_mpc.viz.guided_series import GuidedSeries
 from bluefoot_mpc.viz.packing import pack
 from bluefoot_mpc.viz.plots import Panel, Step, Trace
@@ -56,6 +56,8 @@ def field_pictures(guided: GuidedSeries, scans: Sequence[ReadScan], config: Navi
     usable = [scan for scan in scans if reports[scan.tick]]
     if not usable:
         return None
+    # A robot that has arrived stands, and one picture of it is like the other.
+    usable = [scan for scan in usable if guided.guided[scan.tick] != Guided.ARRIVED] or usable
     steps = tuple(
         Step(
             label=f"{guided.time[item.tick]:.1f} s",

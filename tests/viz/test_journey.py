@@ -20,7 +20,7 @@ from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.runtime.pictures import PictureBook
 from bluefoot_mpc.sim.worlds import footprint
 from bluefoot_mpc.sim.worlds.plan import Solid
-from bluefoot_mpc.types import CameraImage
+from bluefoot_mpc.types import CameraImage, Guided
 from bluefoot_mpc.viz import plots_field
 from bluefoot_mpc.viz.camera_strip import MOST, choose
 from bluefoot_mpc.viz.journey import Journey, journey_of
@@ -378,3 +378,15 @@ def test_bad_sweeps_do_not_spoil_the_report(guided_run: RunData, robot: RobotMod
         frames[5 * k] = dataclasses.replace(frames[5 * k], lidar=bad[k % len(bad)])
     page = read_page(report_html(dataclasses.replace(guided_run, frames=frames), make_summary(), robot))
     assert set(PANELS) <= set(page.ids)
+
+
+def test_a_robot_that_has_arrived_is_shown_once(guided_run: RunData, robot: RobotModel) -> None:
+    telemetry = [
+        dataclasses.replace(t, navigation=dataclasses.replace(t.navigation, guided=Guided.ARRIVED))
+        if t.navigation is not None and t.time >= 4.0
+        else t
+        for t in guided_run.telemetry
+    ]
+    shown = journey(dataclasses.replace(guided_run, telemetry=telemetry), robot)
+    assert [picture.time for picture in shown.strip if picture.label == "arrived"] == [pytest.approx(10.0)]
+    assert all(step.time < 4.0 for panel in shown.panels for step in panel.steps)
