@@ -28,6 +28,8 @@ _REACH = 2.1
 """m around the robot that are shown; arrows of farther points stand at the edge."""
 _ARROWS = 48
 """Rays with an arrow, at most."""
+_IN_PLACE, _TURN = 0.05, 0.30
+"""m (and rad) of a motion that counts as none, and m, radius at which a turn in place is drawn."""
 _AHEAD = 3.0
 """s for which the decided motion is drawn on."""
 
@@ -160,7 +162,10 @@ def box_outline(config: OutlineConfig, margin: float) -> FloatArray:
 
 
 def way_ahead(velocity: FloatArray, yaw_rate: float) -> FloatArray:
-    """(k, 2) m, where a motion leads in the next seconds, with an arrow's head; robot frame."""
+    """(k, 2) m, where a motion leads in the next seconds, with an arrow's head; robot frame.
+
+    A turn in place is an arc around the robot.
+    """
     time = np.linspace(0.0, _AHEAD, 25)
     heading = yaw_rate * (time[1:] + time[:-1]) / 2
     step = np.diff(time)[:, None] * np.column_stack(
@@ -170,8 +175,12 @@ def way_ahead(velocity: FloatArray, yaw_rate: float) -> FloatArray:
         ]
     )
     points = np.concatenate([np.zeros((1, 2)), np.cumsum(step, axis=0)])
-    if not np.isfinite(points).all() or np.hypot(*points[-1]) < 0.02:
+    if not np.isfinite(points).all():
         return np.zeros((1, 2))
+    if np.hypot(*points[-1]) < _IN_PLACE:
+        if abs(yaw_rate) * _AHEAD < _IN_PLACE:
+            return np.zeros((1, 2))
+        points = _TURN * np.column_stack([np.cos(yaw_rate * time), np.sin(yaw_rate * time)])
     last = points[-1] - points[-2]
     return np.concatenate([points, arrow(points[-1], last / np.hypot(*last) * 1e-3, 0.08)[1:5]])
 

@@ -248,6 +248,9 @@ def test_the_way_ahead_is_an_arc() -> None:
     radius = 0.4
     away = np.hypot(arc[:25, 0], arc[:25, 1] - radius)
     assert away == pytest.approx(radius, abs=2e-3)
+    turn = plots_field.way_ahead(np.zeros(2), -0.5)
+    assert np.hypot(*turn[:25].T) == pytest.approx(np.hypot(*turn[0]))
+    assert math.atan2(turn[24, 1], turn[24, 0]) == pytest.approx(-1.5)
     assert len(plots_field.way_ahead(np.zeros(2), 0.0)) == 1
     assert len(plots_field.way_ahead(np.full(2, np.nan), np.nan)) == 1
 
