@@ -17,6 +17,8 @@ class EscapeConfig:
     """When the robot counts as stuck, and what it does then."""
 
     patience: float = 4.0  # s without motion
+    least_speed: float = 0.008  # m/s; who wants less does not want to move
+    least_turn: float = 0.05  # rad/s; likewise
     stall: float = 0.5  # s in which the guard lets nothing pass
     distance: float = 0.05  # m, that count as motion
     turn_deg: float = 10.0  # degrees, that do
@@ -32,12 +34,18 @@ class EscapeConfig:
 
     def __post_init__(self) -> None:
         require_positive(
-            patience=self.patience, stall=self.stall, distance=self.distance, turn_deg=self.turn_deg,
+            patience=self.patience, least_speed=self.least_speed, least_turn=self.least_turn,
+            stall=self.stall, distance=self.distance, turn_deg=self.turn_deg,
             away_time=self.away_time, turn_time=self.turn_time, back_time=self.back_time,
-            side_time=self.side_time,
-            yaw_rate=self.yaw_rate, back_speed=self.back_speed, side_speed=self.side_speed,
+            side_time=self.side_time, yaw_rate=self.yaw_rate, back_speed=self.back_speed,
+            side_speed=self.side_speed,
             enough_deg=self.enough_deg, enough=self.enough,
         )  # fmt: skip
+
+    def is_motion(self, motion: Motion) -> bool:
+        """True where something is wanted that should be seen."""
+        fast = math.hypot(motion.x, motion.y) > self.least_speed
+        return fast or abs(motion.yaw_rate) > self.least_turn
 
 
 class StuckWatch:

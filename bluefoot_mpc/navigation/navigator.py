@@ -104,7 +104,8 @@ class Navigator:
         wanted = allowed(lead.motion, guide.speed, self._config.limits)
         guarded = self._guard.step(self._around.points(), wanted, self._gait)
         self._wanted, self._clearance = guarded.motion, guarded.clearance
-        if any(guarded.motion) or not any(wanted):
+        escape = self._config.escape
+        if escape.is_motion(guarded.motion) or not escape.is_motion(wanted):
             self._stalled = None
         elif self._stalled is None:
             self._stalled = time
@@ -113,7 +114,7 @@ class Navigator:
         """The way out in place of what leads, where the robot has been stuck."""
         pose = self._around.pose
         rests = self._watch.rests(pose, time)
-        if not any(lead.motion):
+        if not self._config.escape.is_motion(lead.motion):
             self._begin_afresh()
             return lead
         stuck = rests > self._config.escape.patience
