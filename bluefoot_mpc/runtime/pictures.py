@@ -23,8 +23,6 @@ PER_EVENT = 4
 """Most pictures of one kind of event: half of them the first ones, the rest the last ones."""
 WIDTH = 320
 """Pixels, about the width that pictures are shrunk to."""
-_LEAST_SIDE = 16
-"""Pixels, each way: a smaller picture shows nothing."""
 LOST = 1.0
 """s that the marker must be out of view until it counts as lost."""
 
@@ -140,7 +138,7 @@ def is_picture(pixels: object) -> bool:
     """True of an array of bytes (height, width, 3): whatever a camera gives, the run goes on."""
     if not isinstance(pixels, np.ndarray) or pixels.dtype != np.uint8:
         return False
-    return pixels.ndim == 3 and pixels.shape[2] == 3 and min(pixels.shape[:2]) >= _LEAST_SIDE
+    return pixels.ndim == 3 and pixels.shape[2] == 3 and min(pixels.shape[:2]) > 0
 
 
 def shrink(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int]:
@@ -149,7 +147,7 @@ def shrink(pixels: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], int]:
     Args:
         pixels: (height, width, 3) uint8.
     """
-    side = max(1, min(16, round(pixels.shape[1] / WIDTH)))
+    side = max(1, min(16, round(pixels.shape[1] / WIDTH), pixels.shape[0]))
     if side == 1:
         return pixels.copy(), 1
     height, width = (side * (length // side) for length in pixels.shape[:2])
