@@ -57,13 +57,11 @@ class Guarded(NamedTuple):
     Attributes:
         motion: to be done.
         clearance: m, from the outline to the nearest point now; infinite in the open.
-        changed: True where it is not what was wanted.
         stopped: True where nothing but standing is allowed.
     """
 
     motion: Motion
     clearance: float
-    changed: bool
     stopped: bool
 
 
@@ -91,11 +89,11 @@ class Guard:
         near = points[(points * points).sum(axis=1) < config.reach**2]
         clearance = float(distances(near, config.outline).min(initial=np.inf))
         if clearance - self._foresight.reach(now, wanted) >= config.comfortable:
-            return Guarded(wanted, clearance, changed=False, stopped=False)
+            return Guarded(wanted, clearance, stopped=False)
         if clearance >= config.comfortable:
             along = closest(near, self._foresight.place(now, wanted), config.outline)
             if along.min() >= config.comfortable:
-                return Guarded(wanted, clearance, changed=False, stopped=False)
+                return Guarded(wanted, clearance, stopped=False)
         near = self._thinned(near)
         motions = np.concatenate((np.array((wanted,)), self._motions))
         along = closest(near, self._foresight.places(now, motions), config.outline)
@@ -103,8 +101,8 @@ class Guard:
         cost = np.where(self._admissible(along, least, clearance), self._cost(motions, wanted, least), np.inf)
         best = int(cost.argmin())
         if not np.isfinite(cost[best]):
-            return Guarded(Motion(), clearance, changed=any(wanted), stopped=True)
-        return Guarded(Motion(*motions[best].tolist()), clearance, changed=best > 0, stopped=False)
+            return Guarded(Motion(), clearance, stopped=True)
+        return Guarded(Motion(*motions[best].tolist()), clearance, stopped=False)
 
     def away(self, points: FloatArray, now: Motion) -> Motion:
         """The motion that gains most clearance without losing any; standing where none does.

@@ -104,6 +104,8 @@ class Navigator:
         wanted = allowed(lead.motion, guide.speed, self._config.limits)
         guarded = self._guard.step(self._around.points(), wanted, self._gait)
         self._wanted, self._clearance = guarded.motion, guarded.clearance
+        if guarded.stopped and not lead.reason:
+            self._lead = lead._replace(reason="held up: nothing but standing keeps clear of things")
         escape = self._config.escape
         if escape.is_motion(guarded.motion) or not escape.is_motion(wanted):
             self._stalled = None
