@@ -83,6 +83,7 @@ class Navigator:
         around, leading = self._around, self._leading
         if frame.time - self._time > self._config.scan.stale_after:
             self._begin_afresh()  # it did not walk in between
+            self._wanted = self._motion = self._gait = Motion()
         self._time = frame.time
         fresh = around.step(frame, estimate)
         leading.look(guide, frame, estimate, dt)

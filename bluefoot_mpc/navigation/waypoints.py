@@ -67,10 +67,12 @@ class Waypoints:
         """Follow this list; what begins like the list so far is gone on with.
 
         Args:
-            waypoints: (n, 2) m in the odometry frame.
+            waypoints: (n, 2) m in the odometry frame; what is not in pairs counts as none.
             time: s.
         """
-        points = np.asarray(waypoints, dtype=np.float64).reshape(-1, 2)
+        points = np.asarray(waypoints, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != 2:
+            points = np.zeros((0, 2))
         if np.array_equal(points, self._list, equal_nan=True):
             return
         done = self._list[: self._next]

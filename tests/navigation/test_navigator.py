@@ -137,6 +137,13 @@ def test_useless_sweeps_leave_it_blind_until_good_ones_come_back(
     assert moves(decision)
 
 
+def test_after_a_pause_it_begins_from_standing() -> None:
+    nav = navigator()
+    assert moves(run(nav, ROOM, 0.0, 2.0))
+    assert not moves(run(nav, None, 10.0, PERIOD))
+    assert moves(run(nav, ROOM, 10.02, 1.0))
+
+
 def test_a_frozen_sweep_counts_as_none() -> None:
     nav = navigator()
     run(nav, ROOM, 0.0, 1.0)

@@ -198,6 +198,13 @@ def test_waypoints_that_are_no_numbers_are_left_out() -> None:
     assert waypoints.reason == "waypoint 1 is not a number; waypoint 2 is not a number"
 
 
+def test_numbers_that_are_no_pairs_are_no_waypoints() -> None:
+    waypoints = Waypoints(WaypointConfig(), PlanConfig())
+    for wrong in (np.zeros(3), np.zeros((2, 3)), np.zeros(0)):
+        waypoints.take(wrong, 0.0)
+        assert waypoints.left == 0
+
+
 def test_a_waypoint_inside_a_thing_or_behind_walls_is_given_up() -> None:
     plan = closed_room(box("box", 2.0, 0.0, 0.8, 0.8))
     grid, waypoints = MapGrid(GridConfig()), Waypoints(WaypointConfig(), PlanConfig())
