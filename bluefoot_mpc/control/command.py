@@ -15,7 +15,7 @@ def usable(motion: MotionCommand, previous: MotionCommand) -> tuple[MotionComman
 
     A speed that is not a number is no speed: the robot comes to rest. A trunk
     offset that is none leaves the trunk where it was told to be before. A guided
-    task with such a number is none, and the robot comes to rest.
+    task with such a number, or one that makes no sense, is none, and the robot comes to rest.
 
     Args:
         motion: the command as it came.
@@ -29,9 +29,9 @@ def usable(motion: MotionCommand, previous: MotionCommand) -> tuple[MotionComman
     if not posed:
         motion = replace(motion, trunk=previous.trunk)
         events = (*events, "trunk command is not finite: the last one is kept")
-    if motion.guide is not None and not _is_finite_guide(motion.guide):
+    if motion.guide is not None and not _is_usable_guide(motion.guide):
         motion = replace(motion, velocity=np.zeros(2), yaw_rate=0.0, guide=None)
-        events = (*events, "the guided task's numbers are not finite: the robot stands")
+        events = (*events, "the guided task's numbers are of no use: the robot stands")
     return motion, events
 
 
@@ -43,5 +43,9 @@ def _has_finite_pose(motion: MotionCommand) -> bool:
     return math.isfinite(sum(motion.trunk.position.tolist()) + sum(motion.trunk.rpy.tolist()))
 
 
-def _is_finite_guide(guide: Guide) -> bool:
-    return math.isfinite(guide.speed + guide.distance) and bool(np.isfinite(guide.waypoints).all())
+def _is_usable_guide(guide: Guide) -> bool:
+    """Speed and distance above zero, waypoints (n, 2), all of it finite."""
+    points = guide.waypoints
+    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+        return False
+    return 0.0 < guide.speed < math.inf and 0.0 < guide.distance < math.inf

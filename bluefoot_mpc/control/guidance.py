@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -18,8 +19,15 @@ _NOTEWORTHY = {
 }
 
 
+FORGET_AFTER = 10.0
+"""s without a task after which the surroundings are forgotten: a gap in the radio is no reason to."""
+
+
 class Guidance:
-    """Velocity, yaw rate and the trunk's pitch of a command with a guide; other commands pass as they are.
+    """Velocity, yaw rate and trunk of a command with a guide; other commands pass as they are.
+
+    The trunk is level but for the pitch that navigation wants: the LIDAR's plane
+    must not look over things, and what is checked is what is walked.
 
     Args:
         config: of navigation.
@@ -28,13 +36,13 @@ class Guidance:
 
     def __init__(self, config: NavigationConfig, mounts: SensorMounts) -> None:
         self._navigator = Navigator(config, mounts)
-        self._guides = False
+        self._guided_at = -math.inf
         self._told: Guided | None = None
 
     def reset(self) -> None:
         """Forget everything."""
         self._navigator.reset()
-        self._guides = False
+        self._guided_at = -math.inf
         self._told = None
 
     def step(
@@ -54,15 +62,15 @@ class Guidance:
             should know of it.
         """
         if motion.guide is None:
-            if self._guides:
-                self.reset()
+            self._told = None
             return motion, None, ()
-        self._guides = True
+        if frame.time - self._guided_at > FORGET_AFTER:
+            self.reset()
+        self._guided_at = frame.time
         if not walks:
             return motion, None, ()
         decision = self._navigator.step(motion.guide, frame, estimate, dt)
-        pitched = np.array([0.0, decision.pitch, 0.0])
-        trunk = TrunkPose(position=motion.trunk.position, rpy=motion.trunk.rpy + pitched)
+        trunk = TrunkPose(rpy=np.array([0.0, decision.pitch, 0.0]))
         guided = replace(motion, velocity=decision.velocity, yaw_rate=decision.yaw_rate, trunk=trunk)
         return guided, decision.report, self._events(decision.report)
 

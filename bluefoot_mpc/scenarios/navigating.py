@@ -98,7 +98,11 @@ class Wander(GuidedScenario):
         if self.config.duration < SEEN_TIME or seen is None:
             return found
         named = f"at least {MIN_SEEN:g} % of the reachable floor seen"
-        return [*found, Criterion(name=named, holds=seen >= MIN_SEEN, detail=f"{seen:.0f} %")]
+        saw = Criterion(
+            name=named, holds=seen >= MIN_SEEN, detail=f"{seen:.0f} %",
+            figure="seen_percent", goal=f"≥ {MIN_SEEN:g} %",
+        )  # fmt: skip
+        return [*found, saw]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -149,6 +153,8 @@ class Goto(GuidedScenario):
             name=f"every waypoint reached within {ARRIVED:g} m",
             holds=worst is not None and worst <= ARRIVED and summary["figures"]["arrived_s"] is not None,
             detail=NOT_MEASURED if worst is None else f"worst {worst:.2f} m",
+            figure="waypoint_distance_m",
+            goal=f"≤ {ARRIVED:g} m",
         )
         return [not_fallen(summary), *nearness_criteria(summary), reached]
 
@@ -177,7 +183,11 @@ def nearness_criteria(summary: Mapping[str, Any]) -> list[Criterion]:
     ]
     if near is not None:
         name = f"nothing nearer than {MIN_APPROACH:g} m"
-        found.append(Criterion(name=name, holds=near >= MIN_APPROACH, detail=f"{near:.3f} m"))
+        kept = Criterion(
+            name=name, holds=near >= MIN_APPROACH, detail=f"{near:.3f} m",
+            figure="closest_approach_m", goal=f"≥ {MIN_APPROACH:g} m",
+        )  # fmt: skip
+        found.append(kept)
     return found
 
 
@@ -185,4 +195,7 @@ def stuck_criterion(summary: Mapping[str, Any]) -> Criterion:
     """Never in one place for more than `MAX_STUCK` while it should move."""
     stuck = summary["figures"]["stuck_longest_s"]
     name = f"never stuck for more than {MAX_STUCK:g} s"
-    return Criterion(name=name, holds=stuck <= MAX_STUCK, detail=f"{stuck:.1f} s at most")
+    return Criterion(
+        name=name, holds=stuck <= MAX_STUCK, detail=f"{stuck:.1f} s at most",
+        figure="stuck_longest_s", goal=f"≤ {MAX_STUCK:g} s",
+    )  # fmt: skip

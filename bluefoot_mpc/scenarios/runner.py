@@ -42,6 +42,7 @@ from bluefoot_mpc.settings import dump_toml
 from bluefoot_mpc.sim.body import Posture
 from bluefoot_mpc.viz.live import LiveView
 from bluefoot_mpc.viz.report import write_report
+from bluefoot_mpc.viz.stage import stage_of
 
 if TYPE_CHECKING:
     from bluefoot_mpc.scenarios.stationed import StationedRun
@@ -162,7 +163,7 @@ def _run_made(
     with log_in(folder):
         with (
             _station(options, resolved, source, on) as station,
-            _observers(made.model, resolved, options, presentation) as observers,
+            _observers(made, resolved, options, presentation) as observers,
             Recorder(folder / LOG, made.table, on.robot.period) as recorder,
         ):
             seen_by = observers if station is None else (*observers, station.observe)
@@ -236,7 +237,7 @@ def _station(
 
 @contextmanager
 def _observers(
-    model: RobotModel, resolved: Resolved, options: RunOptions, presentation: Presentation
+    made: _Made, resolved: Resolved, options: RunOptions, presentation: Presentation
 ) -> Iterator[tuple[Observer, ...]]:
     """Live view and progress bar, as wanted."""
     with ExitStack() as stack:
@@ -245,7 +246,7 @@ def _observers(
             progress = stack.enter_context(Progress(resolved.scenario.config.duration))
             observers.append(lambda frame, output, truth: progress.update(frame.time))
         if options.view:
-            view = LiveView(model)
+            view = LiveView(made.model, stage_of(made.table))
             stack.callback(view.close)
             observers.append(view.update)
         yield tuple(observers)

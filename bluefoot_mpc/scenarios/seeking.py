@@ -76,6 +76,8 @@ class Approach(GuidedScenario):
             name=f"stopped within {DISTANCE_TOLERANCE:g} m of the wanted distance",
             holds=arrived is not None and error is not None and abs(error) <= DISTANCE_TOLERANCE,
             detail=NOT_MEASURED if error is None else f"{error:+.3f} m",
+            figure="distance_error_m",
+            goal=f"± {DISTANCE_TOLERANCE:g} m",
         )
         found = [not_fallen(summary), *nearness_criteria(summary), stuck_criterion(summary)]
         return [*found, stopped]
@@ -139,5 +141,7 @@ class Follow(GuidedScenario):
             name=f"leader in view for at least {MIN_IN_VIEW:g} % of the time",
             holds=seen is not None and seen >= MIN_IN_VIEW,
             detail=NOT_MEASURED if seen is None else f"{seen:.1f} %",
+            figure="in_view_percent",
+            goal=f"≥ {MIN_IN_VIEW:g} %",
         )
         return [not_fallen(summary), *nearness_criteria(summary), view]

@@ -48,6 +48,16 @@ def test_a_task_that_is_not_finite_is_none_and_the_robot_rests(field):
     assert "guided task" in events[0]
 
 
+@pytest.mark.parametrize(
+    "made", [{"speed": 0.0}, {"speed": -0.2}, {"distance": 0.0}, {"waypoints": np.zeros(3)},
+             {"waypoints": np.zeros((2, 3))}],
+)  # fmt: skip
+def test_a_task_that_makes_no_sense_is_none(made):
+    motion, events = usable(MotionCommand(guide=Guide(task=GuideTask.GOTO, **made)), GOOD)
+    assert motion.guide is None
+    assert len(events) == 1
+
+
 def test_a_good_task_goes_through():
     motion = MotionCommand(mode=Mode.WALK, guide=Guide(task=GuideTask.GOTO, waypoints=np.array([[1.0, 2.0]])))
     assert usable(motion, GOOD) == (motion, ())

@@ -71,12 +71,12 @@ def run(pipeline, motion, ticks=3, safety=None):
     return [pipeline.step(pipeline.frame, motion, safety) for _ in range(ticks)][-1].telemetry
 
 
-def test_navigation_decides_velocity_turn_and_pitch_on_top_of_the_commanded_trunk(pipeline):
-    tilted = replace(WANDER, trunk=TrunkPose(rpy=np.array([0.02, 0.01, 0.0])))
+def test_navigation_decides_velocity_turn_and_trunk_whatever_trunk_is_commanded(pipeline):
+    tilted = replace(WANDER, trunk=TrunkPose(rpy=np.array([0.02, 0.01, 0.1])))
     telemetry = run(pipeline, tilted)
     np.testing.assert_array_equal(telemetry.motion.velocity, [0.1, 0.02])
     assert telemetry.motion.yaw_rate == 0.3
-    np.testing.assert_allclose(telemetry.motion.trunk.rpy, [0.02, 0.06, 0.0])
+    np.testing.assert_allclose(telemetry.motion.trunk.rpy, [0.0, 0.05, 0.0])
     assert telemetry.navigation.guided is Guided.FIELD
     guide, frame, estimate = pipeline._guidance._navigator.steps[-1]
     assert guide is tilted.guide
@@ -84,15 +84,23 @@ def test_navigation_decides_velocity_turn_and_pitch_on_top_of_the_commanded_trun
     assert estimate is pipeline.estimate
 
 
-def test_without_a_task_navigation_is_not_asked_and_a_task_that_ends_is_forgotten(pipeline):
+def test_without_a_task_navigation_is_not_asked(pipeline):
     assert run(pipeline, replace(WANDER, guide=None)).navigation is None
     assert pipeline._guidance._navigator.steps == []
-    resets = pipeline._guidance._navigator.resets
     run(pipeline, WANDER)
     telemetry = run(pipeline, replace(WANDER, guide=None), ticks=2)
     assert telemetry.navigation is None
     np.testing.assert_array_equal(telemetry.motion.velocity, 0.0)
-    assert pipeline._guidance._navigator.resets == resets + 1
+
+
+@pytest.mark.parametrize(("gap", "forgets"), [(3.0, False), (30.0, True)])
+def test_the_surroundings_outlast_a_gap_in_the_radio_but_no_long_pause(pipeline, gap, forgets):
+    run(pipeline, WANDER)
+    resets = pipeline._guidance._navigator.resets
+    run(pipeline, replace(WANDER, guide=None))
+    pipeline.frame = replace(pipeline.frame, time=pipeline.frame.time + gap)
+    run(pipeline, WANDER)
+    assert pipeline._guidance._navigator.resets == resets + forgets
 
 
 @pytest.mark.parametrize("cause", ["mode", "supervisor", "estimate"])

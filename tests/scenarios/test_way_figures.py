@@ -10,6 +10,7 @@ from bluefoot_mpc.model.parameters import load_parameters
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.scenarios import way_figures
 from bluefoot_mpc.settings import to_table
+from bluefoot_mpc.sim.config import SimConfig
 from bluefoot_mpc.types import Guided, NavigationReport
 from tests.runtime.made_up_run import make_run
 
@@ -17,10 +18,10 @@ PERIOD = 0.1
 NAN = math.nan
 
 
-def report(guided=Guided.FIELD, marker=(NAN, NAN, NAN)):
+def report(guided=Guided.FIELD, marker=(NAN, NAN, NAN), age=0.1):
     return NavigationReport(
         guided=guided, velocity=np.zeros(2), yaw_rate=0.0, pitch=0.0, field=np.zeros(2), potential=0.0,
-        mixing=0.0, marker=np.array(marker), marker_position=np.full(3, NAN), marker_age=math.inf,
+        mixing=0.0, marker=np.array(marker), marker_position=np.full(3, NAN), marker_age=age,
         clearance=math.inf,
     )  # fmt: skip
 
@@ -29,7 +30,7 @@ def run_along(path, yaw=None, reports=None, marker=None, clearance=None, collisi
     """A run whose trunk is at `path` (n, 2) at the ticks, 0.12 m high."""
     n = len(path)
     base = make_run(1)
-    run = RunData(period=PERIOD, config={"model": to_table(load_parameters())})
+    run = RunData(period=PERIOD, config={"model": to_table(load_parameters()), "sim": to_table(SimConfig())})
     for k in range(n):
         time = k * PERIOD
         turn = 0.0 if yaw is None else yaw[k]
@@ -106,7 +107,23 @@ def test_the_distance_counts_from_the_camera_horizontally():
 
 def test_view_is_the_share_of_ticks_with_a_marker():
     reports = [None] * 4 + [report()] * 3 + [report(marker=(320.0, 240.0, 30.0))] * 9
-    run = run_along(straight(16, 0.01), reports=reports)
+    run = run_along(straight(16, 0.01), reports=reports, marker=(2.0, 0.0, 0.2))
     assert way_figures.in_view_percent(run) == pytest.approx(75.0)
     assert way_figures.first_sight(run) == pytest.approx(0.7)
     assert way_figures.in_view_percent(run_along(straight(3, 0.0), reports=[None] * 3)) is None
+
+
+@pytest.mark.parametrize(
+    ("column", "place", "age", "counts"),
+    [
+        (320.0, (2.0, 0.0), 0.2, True),
+        (320.0, (2.0, 0.0), 3.0, False),  # the picture is old: the camera may be dead
+        (320.0, (2.0, 1.5), 0.2, False),  # what was found is something else
+        (60.0, (2.105, 1.0), 0.2, True),  # left in the picture, left in the world
+        (580.0, (2.105, 1.0), 0.2, False),
+    ],
+)
+def test_a_stale_or_mistaken_marker_is_not_in_view(column, place, age, counts):
+    reports = [report(marker=(column, 240.0, 30.0), age=age)] * 4
+    run = run_along(np.zeros((4, 2)), reports=reports, marker=(*place, 0.2))
+    assert way_figures.in_view_percent(run) == (100.0 if counts else 0.0)
