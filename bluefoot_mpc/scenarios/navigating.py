@@ -140,34 +140,14 @@ class Goto(GuidedScenario):
         return {
             **way_figures.nearness(run),
             **way_figures.movement(run),
-            "waypoint_distance_m": self._distances(run),
+            "waypoint_distance_m": way_figures.waypoint_distances(run, np.array(self.config.waypoints)),
             "waypoints_left": left[-1] if left else None,
             "arrived_s": way_figures.arrival(run),
         }
 
     def criteria(self, summary: Mapping[str, Any]) -> list[Criterion]:
         """On its feet, nothing touched, every waypoint reached."""
-        distances = summary["figures"]["waypoint_distance_m"]
-        worst = max(distances) if distances else None
-        reached = Criterion(
-            name=f"every waypoint reached within {ARRIVED:g} m",
-            holds=worst is not None and worst <= ARRIVED and summary["figures"]["arrived_s"] is not None,
-            detail=NOT_MEASURED if worst is None else f"worst {worst:.2f} m",
-            figure="waypoint_distance_m",
-            goal=f"≤ {ARRIVED:g} m",
-        )
-        return [not_fallen(summary), *nearness_criteria(summary), reached]
-
-    def _distances(self, run: RunData) -> list[float]:
-        """m, true distance of the trunk to each waypoint when the next one became its goal, or at the end."""
-        if not run.truth:
-            return []
-        points = np.array(self.config.waypoints)
-        ticks = [len(run.truth) - 1] * len(points)
-        for k, record in reversed(list(enumerate(run.telemetry[: len(run.truth)]))):
-            done = 0 if record.navigation is None else len(points) - record.navigation.waypoints_left
-            ticks[:done] = [k] * done
-        return [math.dist(run.truth[k].q[:2], point) for k, point in zip(ticks, points, strict=True)]
+        return [not_fallen(summary), *nearness_criteria(summary), waypoint_criterion(summary)]
 
 
 def nearness_criteria(summary: Mapping[str, Any]) -> list[Criterion]:
@@ -189,6 +169,19 @@ def nearness_criteria(summary: Mapping[str, Any]) -> list[Criterion]:
         )  # fmt: skip
         found.append(kept)
     return found
+
+
+def waypoint_criterion(summary: Mapping[str, Any]) -> Criterion:
+    """Every waypoint was reached, not given up."""
+    distances = summary["figures"]["waypoint_distance_m"]
+    worst = max(distances) if distances else None
+    return Criterion(
+        name=f"every waypoint reached within {ARRIVED:g} m",
+        holds=worst is not None and worst <= ARRIVED,
+        detail=NOT_MEASURED if worst is None else f"worst {worst:.2f} m",
+        figure="waypoint_distance_m",
+        goal=f"≤ {ARRIVED:g} m",
+    )
 
 
 def stuck_criterion(summary: Mapping[str, Any]) -> Criterion:

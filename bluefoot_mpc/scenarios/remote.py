@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from bluefoot_mpc.io.station.steps import Steps, read_steps
-from bluefoot_mpc.scenarios.base import Scenario, ScenarioConfig
-from bluefoot_mpc.types import GuideTask, MotionCommand
+from bluefoot_mpc.runtime.data import RunData
+from bluefoot_mpc.scenarios import way_figures
+from bluefoot_mpc.scenarios.base import Criterion, Scenario, ScenarioConfig, not_fallen
+from bluefoot_mpc.scenarios.navigating import nearness_criteria, waypoint_criterion
+from bluefoot_mpc.types import Guide, GuideTask, MotionCommand
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -29,13 +33,32 @@ class Remote(Scenario):
         super().__init__(config)
         self._steps: Steps | None = read_steps(self.config.script) if self.config.script else None
 
+    def figures(self, run: RunData) -> Mapping[str, Any]:
+        """Of a script with waypoints: how near it came to them, and to things."""
+        ways = [guide.waypoints for guide in self._guides if guide.task is GuideTask.GOTO]
+        if not ways:
+            return {}
+        distances = [distance for way in ways for distance in way_figures.waypoint_distances(run, way)]
+        return {**way_figures.nearness(run), "waypoint_distance_m": distances}
+
+    def criteria(self, summary: Mapping[str, Any]) -> list[Criterion]:
+        """On its feet; the waypoints of a script reached, and nothing touched on the way."""
+        if "waypoint_distance_m" not in summary["figures"]:
+            return [not_fallen(summary)]
+        return [not_fallen(summary), *nearness_criteria(summary), waypoint_criterion(summary)]
+
+    @property
+    def _guides(self) -> list[Guide]:
+        """Tasks of the script."""
+        commands = [] if self._steps is None else self._steps.commands
+        return [command.guide for command in commands if command.guide is not None]
+
     @property
     def needs(self) -> tuple[str, ...]:
         """What the script's tasks are done with; a station may ask for tasks or not."""
-        guides = [] if self._steps is None else [c.guide for c in self._steps.commands if c.guide is not None]
-        if not guides:
+        if not self._guides:
             return ()
-        seeks = any(guide.task in (GuideTask.APPROACH, GuideTask.FOLLOW) for guide in guides)
+        seeks = any(guide.task in (GuideTask.APPROACH, GuideTask.FOLLOW) for guide in self._guides)
         return ("lidar", "camera") if seeks else ("lidar",)
 
     @property

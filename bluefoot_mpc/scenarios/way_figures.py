@@ -12,7 +12,7 @@ import numpy as np
 from bluefoot_mpc.geometry import rotation_from_quaternion
 from bluefoot_mpc.runtime import metrics
 from bluefoot_mpc.runtime.data import RunData
-from bluefoot_mpc.types import FloatArray, Guided, NavigationReport, TruthSample
+from bluefoot_mpc.types import FloatArray, Guide, Guided, GuideTask, NavigationReport, TruthSample
 
 STILL_DISTANCE, STILL_YAW = 0.05, math.radians(10.0)
 """m and rad: a robot that has not left this for a while, though it should, is stuck."""
@@ -79,6 +79,31 @@ def distance_figures(run: RunData, wanted: float) -> dict[str, Any]:
     }
 
 
+def waypoint_distances(run: RunData, points: FloatArray) -> list[float]:
+    """Distance of the trunk to each waypoint when the next one became its goal, or when its task ended, m.
+
+    True where there is truth, else estimated; empty where the task never began.
+
+    Args:
+        run: the run.
+        points: (n, 2) m, waypoints of a task of the run, in the odometry frame.
+    """
+    ticks = [k for k, record in enumerate(run.commands) if _goes_to(record.motion.guide, points)]
+    ticks = [k for k in ticks if k < len(run.telemetry)]
+    if not ticks:
+        return []
+    left = [ticks[-1]] * len(points)
+    for k in reversed(ticks):
+        navigation = run.telemetry[k].navigation
+        done = 0 if navigation is None else len(points) - navigation.waypoints_left
+        left[:done] = [k] * done
+    _, position, _ = _track(run)
+    return [
+        math.dist(position[min(k, len(position) - 1)], point)
+        for k, point in zip(left, points.tolist(), strict=True)
+    ]
+
+
 def arrival(run: RunData) -> float | None:
     """s, since when the robot has held its goal at the end of the run; None where it does not."""
     since: float | None = None
@@ -124,6 +149,10 @@ def _is_in_view(run: RunData, tick: int, navigation: NavigationReport) -> bool:
 def _marker_distance(sample: TruthSample, mount: FloatArray) -> float:
     camera = sample.q[:3] + rotation_from_quaternion(sample.q[3:7]) @ mount
     return float(np.hypot(*(sample.marker - camera)[:2]))
+
+
+def _goes_to(guide: Guide | None, points: FloatArray) -> bool:
+    return guide is not None and guide.task is GuideTask.GOTO and np.array_equal(guide.waypoints, points)
 
 
 def _track(run: RunData) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -11,7 +11,7 @@ from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.scenarios import way_figures
 from bluefoot_mpc.settings import to_table
 from bluefoot_mpc.sim.config import SimConfig
-from bluefoot_mpc.types import Guided, NavigationReport
+from bluefoot_mpc.types import Guide, Guided, GuideTask, Mode, MotionCommand, NavigationReport
 from tests.runtime.made_up_run import make_run
 
 PERIOD = 0.1
@@ -127,3 +127,14 @@ def test_a_stale_or_mistaken_marker_is_not_in_view(column, place, age, counts):
     reports = [report(marker=(column, 240.0, 30.0), age=age)] * 4
     run = run_along(np.zeros((4, 2)), reports=reports, marker=(*place, 0.2))
     assert way_figures.in_view_percent(run) == (100.0 if counts else 0.0)
+
+
+def test_waypoints_are_judged_when_the_next_one_becomes_the_goal():
+    points = np.array([[0.5, 0.0], [1.0, 0.3]])
+    reports = [replace(report(Guided.WAYPOINT), waypoints_left=2 if k < 5 else 1) for k in range(11)]
+    run = run_along(straight(11, 0.1), reports=reports)
+    guided = MotionCommand(mode=Mode.WALK, guide=Guide(task=GuideTask.GOTO, waypoints=points))
+    run.commands[:] = [replace(record, motion=guided) for record in run.commands]
+    # Turned to the second at (0.5, 0), and ended at (1.0, 0), 0.3 m beside it.
+    assert way_figures.waypoint_distances(run, points) == pytest.approx([0.0, 0.3])
+    assert way_figures.waypoint_distances(run, points + 1.0) == []
