@@ -54,6 +54,12 @@ def allowed(motion: Motion, speed: float, config: LimitConfig) -> Motion:
     return Motion(share * x, share * y, share * turn)
 
 
+def slowed(motion: Motion, speed: float) -> Motion:
+    """The same arc, no faster forward than `speed` (m/s)."""
+    share = speed / motion.x if motion.x > speed else 1.0
+    return Motion(share * motion.x, share * motion.y, share * motion.yaw_rate)
+
+
 def ramped(now: Motion, wanted: Motion, dt: float, config: LimitConfig) -> Motion:
     """`now`, moved towards `wanted` at limited rates during `dt` seconds; towards rest it may jump."""
     step, turn = config.acceleration * dt, config.yaw_acceleration * dt

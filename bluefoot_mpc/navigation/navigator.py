@@ -12,7 +12,7 @@ from bluefoot_mpc.navigation.config import NavigationConfig
 from bluefoot_mpc.navigation.escape import Escape, StuckWatch
 from bluefoot_mpc.navigation.guard import Guard
 from bluefoot_mpc.navigation.leading import Lead, Leading
-from bluefoot_mpc.navigation.limits import Motion, allowed, ramped
+from bluefoot_mpc.navigation.limits import Motion, allowed, ramped, slowed
 from bluefoot_mpc.navigation.scan import LevelScan
 from bluefoot_mpc.navigation.surroundings import Surroundings
 from bluefoot_mpc.types import BodyState, FloatArray, Guide, Guided, NavigationReport, SensorFrame
@@ -102,9 +102,15 @@ class Navigator:
         """What to do until the next sweep."""
         lead = self._leading.step(guide, self._around, scan)
         self._lead = lead = self._out_of_the_corner(lead, time)
-        wanted = allowed(lead.motion, guide.speed, self._config.limits)
+        speed = guide.speed
+        if self._around.open_ground:
+            # Open ground looks like this, and so does a LIDAR that was covered from the start.
+            speed = min(speed, self._config.scan.open_speed)
+            self._lead = lead = lead._replace(reason=lead.reason or "open ground, no echo at all: slowly")
+        wanted = allowed(lead.motion, speed, self._config.limits)
         guarded = self._guard.step(self._around.points(), wanted, self._gait)
-        self._wanted, self._clearance = guarded.motion, guarded.clearance
+        # Of what the guard chooses from, some is faster than the task allows.
+        self._wanted, self._clearance = slowed(guarded.motion, speed), guarded.clearance
         if guarded.stopped and not lead.reason:
             self._lead = lead._replace(reason="held up: nothing but standing keeps clear of things")
         escape = self._config.escape

@@ -26,6 +26,9 @@ class ScanConfig:
     floor_height: float = 0.06  # m above the feet; lower echoes are the floor
     floor_slope: float = 0.012  # added to it per metre of range: errors of the tilt grow with it
     stale_after: float = 0.5  # s without a new sweep: the robot stands
+    ahead: float = 0.05  # s that a time stamp may lie ahead of the frame's
+    vanishing_range: float = 4.0  # m; what was nearer cannot all be gone in the next sweep
+    open_speed: float = 0.10  # m/s, at most, where nothing is met at all
     least_rays: int = 40  # in a sweep that is of use
     least_view_deg: float = 60.0  # degrees that it must cover to either side of forward
     greatest_gap_deg: float = 3.0  # degrees between neighbouring rays, at most
@@ -33,10 +36,14 @@ class ScanConfig:
     def __post_init__(self) -> None:
         require_positive(
             greatest_range=self.greatest_range, stale_after=self.stale_after, least_rays=self.least_rays,
-            greatest_gap_deg=self.greatest_gap_deg,
+            greatest_gap_deg=self.greatest_gap_deg, vanishing_range=self.vanishing_range,
+            open_speed=self.open_speed,
         )  # fmt: skip
         require_nonnegative(
-            least_range=self.least_range, floor_height=self.floor_height, floor_slope=self.floor_slope
+            least_range=self.least_range,
+            floor_height=self.floor_height,
+            floor_slope=self.floor_slope,
+            ahead=self.ahead,
         )
         require_range(1.0, 180.0, least_view_deg=self.least_view_deg)
 
@@ -90,8 +97,6 @@ class ScanReader:
         config = self._config
         raw = np.asarray(scan.distance, dtype=np.float64)
         echo = (raw >= config.least_range) & (raw <= config.greatest_range)
-        if not echo.any():
-            return "no echo in the whole sweep"
         distance = np.where(echo, raw, config.greatest_range)
         level, rise, origin, lift = self._tilted(estimate)
         points = (self._directions @ level) * distance[:, None]

@@ -62,7 +62,7 @@ class Surroundings:
             return False
         self.pose = pose
         self._history.add(estimate)
-        return frame.lidar is not None and self._take(frame.lidar)
+        return frame.lidar is not None and self._take(frame.lidar, frame.time)
 
     def settle(self) -> bool:
         """Put the newest sweep into memory and map; False where that had been done."""
@@ -89,6 +89,11 @@ class Surroundings:
             return ""
         return f"no usable sweep of the LIDAR for {age:.1f} s" + (f": {self._fault}" if self._fault else "")
 
+    @property
+    def open_ground(self) -> bool:
+        """True where the newest sweep met nothing at all."""
+        return self.scan is not None and not self.scan.hit.any()
+
     def openness(self) -> float:
         """Mean range to the left less that to the right (m): positive where the left is more open."""
         if self.scan is None:
@@ -97,7 +102,11 @@ class Surroundings:
         distance = self.scan.distance
         return float(np.mean(distance[left]) - np.mean(distance[~left]))
 
-    def _take(self, sweep: LidarScan) -> bool:
+    def _take(self, sweep: LidarScan, now: float) -> bool:
+        config = self._config.scan
+        if not -config.stale_after <= sweep.time - now <= config.ahead:
+            self._fault = f"the sweep's time stamp, {sweep.time:.2f} s, is not that of a sweep of now"
+            return False
         state = self._history.at(sweep.time)
         result = self._reader.read(sweep, state)
         if isinstance(result, str):
@@ -105,6 +114,9 @@ class Surroundings:
             return False
         if self.scan is not None and not result.time > self.scan.time:
             self._fault = "the sweep is not newer than the last one"
+            return False
+        if self._all_gone(result):
+            self._fault = "no echo in the whole sweep, though things were near: is the LIDAR covered?"
             return False
         self.settle()
         self._fault = ""
@@ -115,3 +127,9 @@ class Surroundings:
         if pose != self.pose:
             self._fresh = self.pose.to_robot(pose.to_odometry(self._fresh))
         return True
+
+    def _all_gone(self, sweep: LevelScan) -> bool:
+        """True where a sweep without any echo follows one that met something near: things do not vanish."""
+        if self.scan is None or sweep.hit.any() or not self.scan.hit.any():
+            return False
+        return float(self.scan.distance[self.scan.hit].min()) < self._config.scan.vanishing_range

@@ -183,3 +183,25 @@ def test_hemmed_in_on_all_sides_it_stands_still_and_touches_nothing() -> None:
     assert ride.clearance > 0.03
     assert np.abs(ride.path[:, :2]).max() < 0.05
     assert ride.decisions[-1].report.guided is Guided.ESCAPE
+
+
+def test_on_open_ground_it_goes_slowly_and_says_so() -> None:
+    nowhere = replace(ROOM, distance=np.full(BEARINGS.size, np.nan))
+    decision = run(navigator(), nowhere, 0.0, 4.0)
+    assert moves(decision)
+    assert decision.velocity[0] <= 0.10 + 1e-9
+    assert "no echo" in decision.report.reason
+
+
+@pytest.mark.parametrize("stamp", [np.nan, 25.0, -25.0])
+def test_a_sweep_with_an_impossible_time_neither_leads_nor_keeps_good_ones_out(stamp: float) -> None:
+    nav = navigator()
+    decision = nav.step(WANDER, sensor_frame(0.0, replace(ROOM, time=stamp)), body_state(0.0), PERIOD)
+    assert decision.report.guided is Guided.BLIND
+    assert moves(run(nav, ROOM, 0.02, 2.0))
+
+
+def test_the_guard_chooses_nothing_faster_than_the_task_allows() -> None:
+    plan = closed_room(box("box", 1.0, 0.25, 0.5, 0.5), box("other", 2.2, -0.6, 0.5, 0.5))
+    ride = Bench(plan, navigator(), seed=6).ride(Guide(task=GuideTask.WANDER, speed=0.03), 40.0)
+    assert max(decision.velocity[0] for decision in ride.decisions) <= 0.03 + 1e-9

@@ -79,8 +79,6 @@ def test_a_sweep_of_another_length_is_of_use() -> None:
     [
         ({"valid": False}, "invalid"),
         ({"bearing": np.zeros(0), "distance": np.zeros(0)}, "no rays"),
-        ({"distance": np.full(BEARINGS.size, np.nan)}, "no echo"),
-        ({"distance": np.full(BEARINGS.size, 0.003)}, "no echo"),
         ({"distance": np.full(100, 2.0)}, "do not match"),
         ({"bearing": np.full(BEARINGS.size, np.nan)}, "not numbers"),
         ({"bearing": BEARINGS[::-1]}, "do not rise"),
@@ -93,6 +91,13 @@ def test_useless_sweeps_are_named(change: dict[str, object], reason: str) -> Non
     result = reader().read(replace(SWEEP, **change), body_state(1.0))  # type: ignore[arg-type]
     assert isinstance(result, str)
     assert reason in result
+
+
+@pytest.mark.parametrize("distance", [np.nan, 0.003])
+def test_a_sweep_without_any_echo_is_open_ground(distance: float) -> None:
+    scan = read(replace(SWEEP, distance=np.full(BEARINGS.size, distance)))
+    assert not scan.hit.any()
+    np.testing.assert_array_equal(scan.distance, 5.6)
 
 
 def test_a_good_sweep_after_a_useless_one_is_of_use() -> None:
