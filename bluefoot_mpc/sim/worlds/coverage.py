@@ -95,7 +95,7 @@ def reachable(plan: WorldPlan, radius: float = ROBOT_RADIUS, cell: float = CELL)
 class Coverage:
     """What scans have shown of a grid's floor, so far.
 
-    A cell is seen when it lies in reach, inside the sector, and nearer than what its ray hit, or at most
+    Scans that must not be used, or are none, show nothing. A cell is seen when it lies in reach, inside the sector, and nearer than what its ray hit, or at most
     one cell farther. A ray without an echo shows nothing: it may have been lost.
 
     Attributes:
@@ -116,16 +116,16 @@ class Coverage:
         return 1.0 - len(self._left) / self._count
 
     def add(self, pose: FloatArray, scan: LidarScan) -> None:
-        """Take in one scan.
+        """Take in one scan, if it is one.
 
         Args:
             pose: (3,) m, m, rad: the LIDAR's place and direction in world.
             scan: what it measured there.
         """
+        if not _is_usable(scan) or not len(self._left):
+            return
         reach = np.fmin(scan.distance + self.grid.cell, LIDAR_RANGE)
         reach[np.isnan(scan.distance)] = 0.0
-        if not scan.valid or not len(reach) or not len(self._left):
-            return
         offset = self._points - pose[:2]
         square = offset[:, 0] ** 2 + offset[:, 1] ** 2
         near = np.flatnonzero(square <= float(reach.max()) ** 2)
@@ -201,6 +201,14 @@ def _cuts(eye: FloatArray, points: FloatArray, solid: Solid) -> BoolArray:
     ends = np.stack([(-half - start) / direction, (half - start) / direction])
     enter, leave = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
     return np.asarray((enter < leave) & (leave > 0.0) & (enter < 1.0))
+
+
+def _is_usable(scan: LidarScan) -> bool:
+    """True for a scan that may be used: one distance to each of some rising bearings."""
+    if not scan.valid or scan.bearing.ndim != 1 or scan.distance.shape != scan.bearing.shape:
+        return False
+    is_rising = bool(np.all(np.diff(scan.bearing) > 0.0))  # never where one is NaN
+    return is_rising and len(scan.bearing) > 0 and bool(np.isfinite(scan.bearing[[0, -1]]).all())
 
 
 def _nearest_ray(bearings: FloatArray, wanted: FloatArray) -> tuple[NDArray[np.intp], float]:

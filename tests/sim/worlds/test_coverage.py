@@ -110,6 +110,31 @@ def test_nothing_is_seen_behind_what_was_hit_nor_where_no_echo_came():
     assert seen_fraction(grid, [np.zeros(3)], [empty]) == 0.0
 
 
+def spoilt(bearing, distance):
+    return LidarScan(time=0.0, bearing=np.asarray(bearing), distance=np.asarray(distance), valid=True)
+
+
+@pytest.mark.parametrize(
+    "useless",
+    [
+        spoilt(bearings(), np.full(677, 3.0)),
+        spoilt(bearings()[:100], np.full(682, 3.0)),
+        spoilt(bearings()[::-1], np.full(682, 3.0)),
+        spoilt(np.where(np.arange(682) == 300, np.nan, bearings()), np.full(682, 3.0)),
+        spoilt([np.nan], [3.0]),
+        spoilt([-np.inf, 0.0], [3.0, 3.0]),
+        spoilt(np.stack([bearings()] * 2), np.full((2, 682), 3.0)),
+        scan(3.0, valid=False),
+    ],
+)
+def test_scans_that_are_none_are_left_out(useless):
+    coverage = Coverage(reachable(plan_with()))
+    coverage.add(np.zeros(3), useless)
+    assert coverage.fraction == 0.0
+    coverage.add(np.zeros(3), scan(3.0))
+    assert coverage.fraction > 0.5
+
+
 def test_a_far_cell_is_out_of_reach():
     grid = reachable(plan_with(bounds=(-1.0, -1.0, 9.0, 1.0)))
     coverage = Coverage(grid)
