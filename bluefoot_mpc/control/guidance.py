@@ -37,12 +37,14 @@ class Guidance:
     def __init__(self, config: NavigationConfig, mounts: SensorMounts) -> None:
         self._navigator = Navigator(config, mounts)
         self._guided_at = -math.inf
+        self._has_task = False
         self._told: Guided | None = None
 
     def reset(self) -> None:
         """Forget everything."""
         self._navigator.reset()
         self._guided_at = -math.inf
+        self._has_task = False
         self._told = None
 
     def step(
@@ -62,11 +64,13 @@ class Guidance:
             should know of it.
         """
         if motion.guide is None:
-            self._told = None
+            self._has_task, self._told = False, None
             return motion, None, ()
         if frame.time - self._guided_at > FORGET_AFTER:
             self.reset()
-        self._guided_at = frame.time
+        elif not self._has_task:
+            self._navigator.begin()
+        self._has_task, self._guided_at = True, frame.time
         if not walks:
             return motion, None, ()
         decision = self._navigator.step(motion.guide, frame, estimate, dt)

@@ -63,6 +63,11 @@ class Leading:
         self.rest()
         self._task: GuideTask | None = None
 
+    def resume(self, pause: float) -> None:
+        """Leave out a time (s) in which the robot was not asked: nothing was tried in it."""
+        if self._task is GuideTask.GOTO:
+            self.waypoints.resume(pause)
+
     def rest(self) -> None:
         """Start from standing."""
         self._pace = Pace(0.0, 0.0)

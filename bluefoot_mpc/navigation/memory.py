@@ -30,13 +30,14 @@ class MemoryConfig:
     travel: float = 5.0  # m after which it is
     same: float = 0.10  # m, a sweep's range differs less where it shows a point again
     misses: int = 3  # sweeps that look through a point until it is gone
+    no_echo: float = 0.25  # of such a sweep, where the ray met nothing at all
     cell: float = 0.03  # m, of points in one such square one is kept
     thin_every: int = 10  # sweeps after which they are thinned out so
 
     def __post_init__(self) -> None:
         require_positive(
             reach=self.reach, rays=self.rays, capacity=self.capacity, age=self.age, travel=self.travel,
-            misses=self.misses, cell=self.cell, thin_every=self.thin_every,
+            misses=self.misses, cell=self.cell, thin_every=self.thin_every, no_echo=self.no_echo,
         )  # fmt: skip
         require_nonnegative(same=self.same)
 
@@ -99,7 +100,9 @@ class PointMemory:
         range_ = np.minimum(scan.distance[ray], scan.distance[ray - 1])
         shown = inside & (np.abs(range_ - far) <= config.same)
         through = inside & (range_ > far + config.same)
-        self._seen[:, 2] += through
+        # A ray that met nothing is a weak proof: glass and black things send nothing back either.
+        proof = np.where(scan.hit[ray] & scan.hit[ray - 1], 1.0, config.no_echo)
+        self._seen[:, 2] += proof * through
         young = (self._seen[:, 0] > scan.time - config.age) & (
             self._seen[:, 1] > self._travel - config.travel
         )

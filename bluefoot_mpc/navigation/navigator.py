@@ -71,6 +71,13 @@ class Navigator:
         self._stalled: float | None = None
         self._time = -math.inf
 
+    def begin(self) -> None:
+        """Forget the task, not the surroundings: what comes next is a new one, even if it is the same."""
+        self._leading.reset()
+        self._begin_afresh()
+        self._lead = Lead(Guided.BLIND, Motion())
+        self._wanted = self._motion = self._gait = Motion()
+
     def step(self, guide: Guide, frame: SensorFrame, estimate: BodyState, dt: float) -> Decision:
         """One tick.
 
@@ -83,6 +90,7 @@ class Navigator:
         around, leading = self._around, self._leading
         if frame.time - self._time > self._config.scan.stale_after:
             self._begin_afresh()  # it did not walk in between
+            self._leading.resume(frame.time - self._time)
             self._wanted = self._motion = self._gait = Motion()
         self._time = frame.time
         fresh = around.step(frame, estimate)
@@ -104,9 +112,9 @@ class Navigator:
         self._lead = lead = self._out_of_the_corner(lead, time)
         speed = guide.speed
         if self._around.open_ground:
-            # Open ground looks like this, and so does a LIDAR that was covered from the start.
+            # Open ground looks like this, and so does a LIDAR that is dirty, or was covered from the start.
             speed = min(speed, self._config.scan.open_speed)
-            self._lead = lead = lead._replace(reason=lead.reason or "open ground, no echo at all: slowly")
+            self._lead = lead = lead._replace(reason=lead.reason or "open ground, hardly an echo: slowly")
         wanted = allowed(lead.motion, speed, self._config.limits)
         guarded = self._guard.step(self._around.points(), wanted, self._gait)
         # Of what the guard chooses from, some is faster than the task allows.

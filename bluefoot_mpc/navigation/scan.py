@@ -28,7 +28,10 @@ class ScanConfig:
     stale_after: float = 0.5  # s without a new sweep: the robot stands
     ahead: float = 0.05  # s that a time stamp may lie ahead of the frame's
     vanishing_range: float = 4.0  # m; what was nearer cannot all be gone in the next sweep
-    open_speed: float = 0.10  # m/s, at most, where nothing is met at all
+    vanishing_rays: int = 5  # that must have met it
+    edge_deg: float = 20.0  # degrees at either edge of the view, where things leave it as the robot turns
+    open_share: float = 0.05  # of the rays; where fewer meet a thing the ground counts as open
+    open_speed: float = 0.10  # m/s, at most, on open ground
     least_rays: int = 40  # in a sweep that is of use
     least_view_deg: float = 60.0  # degrees that it must cover to either side of forward
     greatest_gap_deg: float = 3.0  # degrees between neighbouring rays, at most
@@ -37,7 +40,7 @@ class ScanConfig:
         require_positive(
             greatest_range=self.greatest_range, stale_after=self.stale_after, least_rays=self.least_rays,
             greatest_gap_deg=self.greatest_gap_deg, vanishing_range=self.vanishing_range,
-            open_speed=self.open_speed,
+            open_speed=self.open_speed, vanishing_rays=self.vanishing_rays,
         )  # fmt: skip
         require_nonnegative(
             least_range=self.least_range,
@@ -46,6 +49,8 @@ class ScanConfig:
             ahead=self.ahead,
         )
         require_range(1.0, 180.0, least_view_deg=self.least_view_deg)
+        require_range(0.0, 90.0, edge_deg=self.edge_deg)
+        require_range(0.0, 1.0, open_share=self.open_share)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -91,8 +91,8 @@ class Surroundings:
 
     @property
     def open_ground(self) -> bool:
-        """True where the newest sweep met nothing at all."""
-        return self.scan is not None and not self.scan.hit.any()
+        """True where the newest sweep met hardly anything."""
+        return self.scan is not None and float(self.scan.hit.mean()) < self._config.scan.open_share
 
     def openness(self) -> float:
         """Mean range to the left less that to the right (m): positive where the left is more open."""
@@ -129,7 +129,13 @@ class Surroundings:
         return True
 
     def _all_gone(self, sweep: LevelScan) -> bool:
-        """True where a sweep without any echo follows one that met something near: things do not vanish."""
-        if self.scan is None or sweep.hit.any() or not self.scan.hit.any():
+        """True where a sweep without any echo follows one with things near and well inside the view.
+
+        Such things do not vanish; what was at the edge of the view may just have left it.
+        """
+        if self.scan is None or sweep.hit.any():
             return False
-        return float(self.scan.distance[self.scan.hit].min()) < self._config.scan.vanishing_range
+        config, last = self._config.scan, self.scan
+        near = last.hit & (last.distance < config.vanishing_range)
+        inside = np.abs(last.bearing) < np.abs(last.bearing).max() - math.radians(config.edge_deg)
+        return int(np.count_nonzero(near & inside)) >= config.vanishing_rays

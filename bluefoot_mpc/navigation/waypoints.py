@@ -112,6 +112,11 @@ class Waypoints:
         if math.isinf(self._allowed) and math.isfinite(self._way.length):
             self._allowed = config.grace + config.slowness * self._way.length / max(speed, 0.02)
 
+    def resume(self, pause: float) -> None:
+        """Leave a pause (s) out of the time that the present waypoint has taken."""
+        self._since += pause
+        self._way.found += pause
+
     @property
     def way(self) -> FloatArray:
         """(k, 2) m in the odometry frame, to the next waypoint; empty where there is none."""

@@ -34,7 +34,10 @@ class ScriptedNavigator:
     """Decides the same on every tick and notes what it was asked."""
 
     def __init__(self, config, mounts):
-        self.steps, self.resets, self.guided = [], 0, Guided.FIELD
+        self.steps, self.resets, self.begins, self.guided = [], 0, 0, Guided.FIELD
+
+    def begin(self):
+        self.begins += 1
 
     def reset(self):
         self.resets += 1
@@ -101,6 +104,7 @@ def test_the_surroundings_outlast_a_gap_in_the_radio_but_no_long_pause(pipeline,
     pipeline.frame = replace(pipeline.frame, time=pipeline.frame.time + gap)
     run(pipeline, WANDER)
     assert pipeline._guidance._navigator.resets == resets + forgets
+    assert pipeline._guidance._navigator.begins == (not forgets)  # the task itself is a new one
 
 
 @pytest.mark.parametrize("cause", ["mode", "supervisor", "estimate"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from bluefoot_mpc.navigation.memory import MemoryConfig, PointMemory, nearest
 from bluefoot_mpc.navigation.pose import Pose
@@ -31,6 +32,7 @@ def pole(bearing: float, far: float, time: float = 0.0) -> LevelScan:
 
 
 OPEN = np.full(BEARINGS.size, 5.6)
+WALLS = np.full(BEARINGS.size, 3.0)
 
 
 def near(memory: PointMemory, x: float, y: float) -> int:
@@ -47,13 +49,16 @@ def test_what_goes_out_of_sight_stays_where_it_was() -> None:
     assert near(memory, 0.6 * math.cos(2.0), 0.6 * math.sin(2.0)) >= 1
 
 
-def test_what_a_sweep_looks_through_goes_after_three() -> None:
+@pytest.mark.parametrize(("behind", "sweeps"), [(WALLS, 3), (OPEN, 12)])
+def test_what_is_looked_through_goes_sooner_where_something_is_met_behind_it(
+    behind: FloatArray, sweeps: int
+) -> None:
     memory = PointMemory(CONFIG)
     memory.step(pole(0.5, 0.6), Pose(0.0, 0.0, 0.0))
     place = 0.6 * math.cos(0.5), 0.6 * math.sin(0.5)
-    for k in range(3):
+    for k in range(sweeps):
         assert near(memory, *place) >= 1
-        memory.step(sweep(OPEN, 0.1 * k), Pose(0.0, 0.0, 0.0))
+        memory.step(sweep(behind, 0.1 * k), Pose(0.0, 0.0, 0.0))
     assert near(memory, *place) == 0
 
 

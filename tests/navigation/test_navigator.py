@@ -190,7 +190,7 @@ def test_on_open_ground_it_goes_slowly_and_says_so() -> None:
     decision = run(navigator(), nowhere, 0.0, 4.0)
     assert moves(decision)
     assert decision.velocity[0] <= 0.10 + 1e-9
-    assert "no echo" in decision.report.reason
+    assert "open ground" in decision.report.reason
 
 
 @pytest.mark.parametrize("stamp", [np.nan, 25.0, -25.0])
@@ -205,3 +205,46 @@ def test_the_guard_chooses_nothing_faster_than_the_task_allows() -> None:
     plan = closed_room(box("box", 1.0, 0.25, 0.5, 0.5), box("other", 2.2, -0.6, 0.5, 0.5))
     ride = Bench(plan, navigator(), seed=6).ride(Guide(task=GuideTask.WANDER, speed=0.03), 40.0)
     assert max(decision.velocity[0] for decision in ride.decisions) <= 0.03 + 1e-9
+
+
+def test_what_leaves_the_view_as_the_robot_turns_is_no_covered_lidar() -> None:
+    nav = navigator()
+    distance = np.full(BEARINGS.size, np.nan)
+    distance[:30] = 1.0  # the last that is seen of a box to the right
+    run(nav, replace(ROOM, distance=distance), 0.0, 1.0)
+    decision = run(nav, replace(ROOM, distance=np.full(BEARINGS.size, np.nan)), 1.0, 3.0)
+    assert decision.report.guided is not Guided.BLIND
+    assert moves(decision)
+
+
+def test_a_pause_is_no_time_in_which_a_waypoint_was_tried() -> None:
+    nav = navigator()
+    guide = Guide(task=GuideTask.GOTO, speed=0.2, waypoints=np.array(((1.5, 0.0),)))
+
+    def go(start: float, seconds: float) -> Decision:
+        for tick in range(round(seconds / PERIOD)):
+            time = start + tick * PERIOD
+            fresh = replace(ROOM, time=time) if tick % 5 == 0 else None
+            decision = nav.step(guide, sensor_frame(time, fresh), body_state(time), PERIOD)
+        return decision
+
+    go(0.0, 2.0)
+    decision = go(60.0, 2.0)
+    assert decision.report.waypoints_left == 1, decision.report.reason
+    assert moves(decision)
+
+
+def test_the_same_task_given_again_is_a_new_one_in_known_surroundings() -> None:
+    nav = navigator()
+    guide = Guide(task=GuideTask.GOTO, speed=0.2, waypoints=np.zeros((1, 2)))
+    for tick in range(20):
+        time = tick * PERIOD
+        fresh = replace(ROOM, time=time) if tick % 5 == 0 else None
+        decision = nav.step(guide, sensor_frame(time, fresh), body_state(time), PERIOD)
+    assert decision.report.guided is Guided.ARRIVED
+    known = len(nav._around.points())
+    nav.begin()
+    assert len(nav._around.points()) == known
+    other = replace(guide, waypoints=np.array(((1.0, 0.0),)))
+    decision = nav.step(other, sensor_frame(0.5, replace(ROOM, time=0.5)), body_state(0.5), PERIOD)
+    assert decision.report.waypoints_left == 1
