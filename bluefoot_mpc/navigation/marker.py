@@ -108,7 +108,6 @@ class MarkerFinder:
             (config.red, config.green, config.blue), config.hue_tolerance_deg,
             config.least_saturation, config.least_value,
         )  # fmt: skip
-        self._nominal = marker_colour.saturation_and_hue((config.red, config.green, config.blue))
         self._reason = "no picture yet"
 
     @property
@@ -186,10 +185,9 @@ class MarkerFinder:
 
     def _circles(self, patch: Patch, limits: Limits) -> Iterator[Circle]:
         """Circles to try, the likeliest first; costly ones are only worked out where they are asked for."""
-        for mask in (patch.mask, marker_colour.nearest_colour(patch, self._nominal)):
-            circle = None if mask is None else marker_colour.contour_circle(patch, mask)
-            if circle is not None:
-                yield circle
+        circle = marker_colour.contour_circle(patch)
+        if circle is not None:
+            yield circle
         yield from marker_colour.hough_circles(patch, limits.least_radius, limits.greatest_radius)
 
     def _limits(self, shape: tuple[int, ...]) -> Limits:

@@ -19,8 +19,6 @@ LARGEST_PATCH = 330
 """Pixels: larger patches are measured in a reduced picture; a large ball has edge enough."""
 LEAST_FILL = 0.25
 """Share of its box that a patch fills at least: less are thin lines and crumbs."""
-LEAST_PARTING = 12.0
-"""Levels of saturation between two colours in one patch."""
 MOST_EDGES = 0.08
 """Share of a patch that edges may take: Hough's transform of grain takes seconds and finds nothing."""
 HOUGH_CIRCLES = 3
@@ -98,12 +96,6 @@ class Patch:
     height: int
 
 
-def saturation_and_hue(colour: tuple[float, float, float]) -> tuple[int, int]:
-    """Of a colour (red, green, blue, 0..1), as OpenCV counts them: 0..255 and 0..179."""
-    hue, saturation, _ = colorsys.rgb_to_hsv(*colour)
-    return round(255.0 * saturation), round(180.0 * hue) % 180
-
-
 def colour_mask(hsv: Any, colour: ColourRange) -> Any:
     """(h, w) 255 where the pixels (h, w, 3), hue, saturation, value, have the colour, else 0."""
     import cv2  # noqa: PLC0415
@@ -172,13 +164,13 @@ def cut_around(pixels: Any, circle: Circle, colour: ColourRange) -> Patch:
     return cut(pixels, box, colour)
 
 
-def contour_circle(patch: Patch, mask: NDArray[np.uint8]) -> Circle | None:
-    """The circle on which most of a mask's contour lies; None where there is none.
+def contour_circle(patch: Patch) -> Circle | None:
+    """The circle on which most of the patch's contour lies; None where there is none.
 
     What an obstacle or the picture's edge cuts off may miss. Circles through three points each are tried and
     scored by the contour's length on them.
     """
-    points = _contour(patch, mask)
+    points = _contour(patch)
     if len(points) < 8:
         return None
     circles = _circles_through(points)
@@ -196,33 +188,6 @@ def contour_circle(patch: Patch, mask: NDArray[np.uint8]) -> Circle | None:
     return (
         patch.left + patch.scale * column, patch.upper + patch.scale * row, patch.scale * radius
     ) if math.isfinite(radius) else None  # fmt: skip
-
-
-def nearest_colour(patch: Patch, nominal: tuple[int, int]) -> NDArray[np.uint8] | None:
-    """(h, w) 255 where a mask of two colours has the one nearer to the marker's; None where it has one.
-
-    Otsu's threshold of the distance in saturation and hue parts a ball from a wall that is a little paler:
-    shading changes neither.
-
-    Args:
-        patch: the picture.
-        nominal: saturation and hue of the marker, as OpenCV counts them.
-    """
-    import cv2  # noqa: PLC0415
-
-    hsv: Any = cv2.GaussianBlur(patch.hsv, (3, 3), 0.8)
-    levels = np.arange(256)
-    saturation = cv2.LUT(hsv[:, :, 1], np.abs(levels - nominal[0]).astype(np.uint8))
-    hue = cv2.LUT(hsv[:, :, 0], np.minimum(3 * np.abs(levels - nominal[1]), 120).astype(np.uint8))
-    distance = cv2.add(saturation, hue)
-    values = distance[patch.mask > 0].reshape(-1, 1)
-    if len(values) < 20:
-        return None
-    level, _ = cv2.threshold(values, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
-    low, high = values[values <= level], values[values > level]
-    if not len(low) or not len(high) or float(high.mean()) - float(low.mean()) < LEAST_PARTING:
-        return None
-    return np.where(distance <= level, patch.mask, np.uint8(0))
 
 
 def hough_circles(patch: Patch, least: float, greatest: float) -> Iterator[Circle]:
@@ -253,11 +218,11 @@ def hough_circles(patch: Patch, least: float, greatest: float) -> Iterator[Circl
             )  # fmt: skip
 
 
-def _contour(patch: Patch, mask: NDArray[np.uint8]) -> FloatArray:
+def _contour(patch: Patch) -> FloatArray:
     """(n, 2) column, row in the patch of its largest contour: at most 120, none on the picture's edge."""
     import cv2  # noqa: PLC0415
 
-    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    contours, _ = cv2.findContours(patch.mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
         return np.zeros((0, 2))
     # By their boxes: a thin rest beside the ball may be long but is not large.

@@ -39,8 +39,6 @@ REWEIGHTED = 3
 """Rounds of least squares in which what is far off loses its weight."""
 TOLERANCE = 0.02
 """Of the angular radius: how far from the fit an edge supports it (and always within 0.8 pixels)."""
-NOISE = 3.0
-"""Times the slope inside the ball that its edge must have: grain has edges everywhere."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -208,14 +206,6 @@ class Rim:
         seen = self.coloured(INSIDE).all(axis=1) & self.in_picture(found[:, None])[:, 0]
         return Edge(angle=found, strength=strength, seen=seen)
 
-    def grain(self, seen: BoolArray) -> float:
-        """Median slope inside the ball, levels per pixel: shading is gentle, so this is grain."""
-        if not seen.any():
-            return 0.0
-        angle = 0.7 * self.cone.angle + self.pixel * np.array([-0.5, 0.5])
-        values = self.sample(self.patch.pixels, angle)[seen]
-        return float(np.median(np.sqrt(((values[:, 1] - values[:, 0]) ** 2).sum(axis=1))))
-
 
 def _cone_of(circle: Circle, lens: Lens) -> Cone:
     """The cone of a circle in the picture: away from its middle a ball appears larger."""
@@ -263,7 +253,7 @@ def _judged(rim: Rim, limits: Limits) -> Cone | None:
         return None
     edge = rim.edge(WINDOWS[-1])
     distance = np.abs(edge.angle - cone.angle)
-    fits = edge.seen & (edge.strength > max(LEAST_STEP, NOISE * rim.grain(edge.seen)))
+    fits = edge.seen & (edge.strength > LEAST_STEP)
     fits &= distance < max(TOLERANCE * cone.angle, 0.8 * rim.pixel)
     arc = float(edge.seen.mean())
     if arc < limits.least_arc or fits.mean() < 0.8 * limits.least_arc:

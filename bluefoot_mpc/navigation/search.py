@@ -19,7 +19,7 @@ MOVES = 0.01
 class SearchConfig:
     """How the robot looks for a marker."""
 
-    turn_rate: float = 0.45  # rad/s, of a look around
+    turn_rate: float = 0.5  # rad/s, of a look around
     look_turn_deg: float = 360.0  # degrees, of a look around
     wander_time: float = 14.0  # s between two looks around, at least
     wander_distance: float = 1.3  # m between two looks around, at least

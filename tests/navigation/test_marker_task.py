@@ -135,6 +135,8 @@ def test_a_leader_that_stops_is_stood_behind(task: MarkerTask) -> None:
 def test_a_leader_hidden_for_a_moment_is_not_lost(task: MarkerTask) -> None:
     stage = Stage(marker=_circle, hidden=lambda t: 10.0 < t < 11.5)
     wishes = stage.run(task, FOLLOW, 25.0)
+    assert all(w.guided is Guided.MARKER for w in wishes[500:580])
+    assert all(w.mixing == 0.0 for w in wishes[520:570])
     assert wishes[-1].guided is Guided.MARKER
     assert abs(stage.distance() - 0.6) < 0.06
 
@@ -145,6 +147,8 @@ def test_a_leader_that_is_gone_is_looked_for(task: MarkerTask) -> None:
     assert wishes[-1].guided is Guided.SEARCH
     reasons = {w.reason for w in wishes if w.guided is Guided.SEARCH}
     assert {"looking around", "going to where the marker was lost"} <= reasons
+    assert wishes[-1].reason == "wandering"
+    assert np.isnan(wishes[-1].position).all()  # there it is not
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ def phases(wishes: list[SearchWish]) -> list[Phase]:
 
 def test_never_seen_a_whole_turn_then_wandering_and_again() -> None:
     robot = Robot()
-    wishes = robot.go(Search(CONFIG), None, 40.0)
+    wishes = robot.go(Search(CONFIG), None, 36.0)
     assert phases(wishes) == [Phase.LOOK, Phase.WANDER, Phase.LOOK]
     turn = [w for w in wishes if w.phase is Phase.LOOK]
     assert all(w.motion is not None and w.motion.x == 0.0 for w in turn)
