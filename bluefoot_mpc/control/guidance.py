@@ -13,9 +13,9 @@ from bluefoot_mpc.navigation.navigator import Navigator
 from bluefoot_mpc.types import BodyState, Guided, MotionCommand, NavigationReport, SensorFrame, TrunkPose
 
 _NOTEWORTHY = {
-    Guided.ARRIVED: "arrived:",
-    Guided.ESCAPE: "boxed in:",
-    Guided.BLIND: "nothing to go by, the robot stands:",
+    Guided.ARRIVED: "at the end of the way",
+    Guided.ESCAPE: "boxed in",
+    Guided.BLIND: "nothing to go by, the robot stands",
 }
 
 
@@ -74,8 +74,11 @@ class Guidance:
         if not walks:
             return motion, None, ()
         decision = self._navigator.step(motion.guide, frame, estimate, dt)
-        trunk = TrunkPose(rpy=np.array([0.0, decision.pitch, 0.0]))
-        guided = replace(motion, velocity=decision.velocity, yaw_rate=decision.yaw_rate, trunk=trunk)
+        velocity, yaw_rate, pitch = decision.velocity, decision.yaw_rate, decision.pitch
+        if not math.isfinite(velocity.sum() + yaw_rate + pitch):
+            return motion, decision.report, ("navigation: its decision is no number, the robot stands",)
+        trunk = TrunkPose(rpy=np.array([0.0, pitch, 0.0]))
+        guided = replace(motion, velocity=velocity, yaw_rate=yaw_rate, trunk=trunk)
         return guided, decision.report, self._events(decision.report)
 
     def _events(self, report: NavigationReport) -> tuple[str, ...]:
@@ -83,4 +86,5 @@ class Guidance:
         before, self._told = self._told, report.guided
         if report.guided is before or report.guided not in _NOTEWORTHY:
             return ()
-        return (f"navigation: {_NOTEWORTHY[report.guided]} {report.reason}".rstrip(": "),)
+        told = _NOTEWORTHY[report.guided]
+        return (f"navigation: {told}: {report.reason}" if report.reason else f"navigation: {told}",)

@@ -23,6 +23,8 @@ MIN_APPROACH = 0.10
 """m, nearest that any part of the robot may come to anything but the floor."""
 MAX_STUCK = 10.0
 """s."""
+MAX_BLIND = 10.0
+"""Percent of the time that the robot may stand because its sensors tell nothing."""
 MIN_SEEN = 60.0
 """Percent of the floor that the robot can get at, to be seen by the LIDAR in `SEEN_TIME`."""
 SEEN_TIME = 100.0
@@ -93,7 +95,7 @@ class Wander(GuidedScenario):
 
     def criteria(self, summary: Mapping[str, Any]) -> list[Criterion]:
         """On its feet, nothing touched, never stuck, and most of the floor seen."""
-        found = [not_fallen(summary), *nearness_criteria(summary), stuck_criterion(summary)]
+        found = [*safe_criteria(summary), stuck_criterion(summary)]
         seen = summary["figures"].get("seen_percent")
         if self.config.duration < SEEN_TIME or seen is None:
             return found
@@ -147,7 +149,19 @@ class Goto(GuidedScenario):
 
     def criteria(self, summary: Mapping[str, Any]) -> list[Criterion]:
         """On its feet, nothing touched, every waypoint reached."""
-        return [not_fallen(summary), *nearness_criteria(summary), waypoint_criterion(summary)]
+        return [*safe_criteria(summary), waypoint_criterion(summary)]
+
+
+def safe_criteria(summary: Mapping[str, Any]) -> list[Criterion]:
+    """On its feet, nothing touched, and not without sensors to go by."""
+    led = summary["figures"]["led_by_percent"]
+    blind = led.get("blind", 0.0) if led else 100.0
+    sighted = Criterion(
+        name=f"something to go by for {100.0 - MAX_BLIND:g} % of the time",
+        holds=blind <= MAX_BLIND,
+        detail=f"{100.0 - blind:.0f} %",
+    )
+    return [not_fallen(summary), sighted, *nearness_criteria(summary)]
 
 
 def nearness_criteria(summary: Mapping[str, Any]) -> list[Criterion]:

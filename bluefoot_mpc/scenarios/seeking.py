@@ -9,8 +9,8 @@ from typing import Any
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.scenarios import way_figures
-from bluefoot_mpc.scenarios.base import NOT_MEASURED, Criterion, not_fallen
-from bluefoot_mpc.scenarios.navigating import GuidedConfig, GuidedScenario, nearness_criteria, stuck_criterion
+from bluefoot_mpc.scenarios.base import NOT_MEASURED, Criterion
+from bluefoot_mpc.scenarios.navigating import GuidedConfig, GuidedScenario, safe_criteria, stuck_criterion
 from bluefoot_mpc.settings import require_range
 from bluefoot_mpc.sim.config import SimConfig
 from bluefoot_mpc.types import Guide, GuideTask
@@ -18,6 +18,8 @@ from bluefoot_mpc.wheels.ready import READY
 
 DISTANCE_TOLERANCE = 0.05
 """m, of the wanted distance, that the robot may stop from it."""
+FOLLOWING_TOLERANCE = 0.15
+"""m, of the wanted distance, that the median of a run may differ from it."""
 MIN_IN_VIEW = 90.0
 """Percent of the time that the leader has to be in view."""
 MAX_LEADER_SPEED = 0.15
@@ -75,12 +77,11 @@ class Approach(GuidedScenario):
         stopped = Criterion(
             name=f"stopped within {DISTANCE_TOLERANCE:g} m of the wanted distance",
             holds=arrived is not None and error is not None and abs(error) <= DISTANCE_TOLERANCE,
-            detail=NOT_MEASURED if error is None else f"{error:+.3f} m",
+            detail=_stop_detail(error, arrived),
             figure="distance_error_m",
             goal=f"± {DISTANCE_TOLERANCE:g} m",
         )
-        found = [not_fallen(summary), *nearness_criteria(summary), stuck_criterion(summary)]
-        return [*found, stopped]
+        return [*safe_criteria(summary), stuck_criterion(summary), stopped]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -144,4 +145,21 @@ class Follow(GuidedScenario):
             figure="in_view_percent",
             goal=f"≥ {MIN_IN_VIEW:g} %",
         )
-        return [not_fallen(summary), *nearness_criteria(summary), view]
+        return [*safe_criteria(summary), self._distance_criterion(summary), view]
+
+    def _distance_criterion(self, summary: Mapping[str, Any]) -> Criterion:
+        """Who only watches the leader does not follow it."""
+        wanted, median = self.config.distance, summary["figures"]["distance_median_m"]
+        return Criterion(
+            name=f"median distance within {FOLLOWING_TOLERANCE:g} m of the wanted one",
+            holds=median is not None and abs(median - wanted) <= FOLLOWING_TOLERANCE,
+            detail=NOT_MEASURED if median is None else f"{median:.2f} of {wanted:g} m",
+            figure="distance_median_m",
+            goal=f"{wanted:g} ± {FOLLOWING_TOLERANCE:g} m",
+        )
+
+
+def _stop_detail(error: float | None, arrived: float | None) -> str:
+    if error is None:
+        return "there is no marker in this world"
+    return f"{error:+.3f} m" if arrived is not None else f"it never stopped there ({error:+.2f} m)"

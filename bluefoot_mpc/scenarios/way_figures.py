@@ -20,6 +20,8 @@ FRESH = 0.4
 """s, greatest age of a picture in which the marker counts as in view: it comes 0.1 s late, every 0.1 s."""
 ASIDE = 0.2
 """rad between where the marker was found and where it is, at most: the robot turns while a picture comes."""
+SAME_PLACE = 0.3
+"""m."""
 _STRIDE = 0.5
 """s between the points of the path whose length is measured: steps and sway in between do not count."""
 _AT_REST = 1.0
@@ -45,6 +47,7 @@ def movement(run: RunData) -> dict[str, Any]:
     return {
         "path_m": float(np.hypot(*steps.T).sum()) if len(steps) else 0.0,
         "stuck_longest_s": _longest_still(time, position, yaw, _should_move(run)),
+        "same_place_longest_s": _longest_near(time, position),
         "led_by_percent": {name: 100.0 * count / total for name, count in sorted(led.items())},
     }
 
@@ -167,6 +170,16 @@ def _track(run: RunData) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _should_move(run: RunData) -> list[bool]:
     return [t.navigation is not None and t.navigation.guided is not Guided.ARRIVED for t in run.telemetry]
+
+
+def _longest_near(time: FloatArray, position: FloatArray) -> float:
+    """s, longest stay within `SAME_PLACE` of a place, whatever the robot does there."""
+    longest, anchor = 0.0, 0
+    for k in range(len(time)):
+        if math.hypot(*(position[k] - position[anchor]).tolist()) > SAME_PLACE:
+            anchor = k
+        longest = max(longest, float(time[k] - time[anchor]))
+    return longest
 
 
 def _longest_still(time: FloatArray, position: FloatArray, yaw: FloatArray, moves: list[bool]) -> float:

@@ -35,6 +35,7 @@ class ScriptedNavigator:
 
     def __init__(self, config, mounts):
         self.steps, self.resets, self.begins, self.guided = [], 0, 0, Guided.FIELD
+        self.yaw_rate = 0.3
 
     def begin(self):
         self.begins += 1
@@ -49,7 +50,7 @@ class ScriptedNavigator:
             field=np.zeros(2), potential=0.0, mixing=0.0, marker=np.full(3, math.nan),
             marker_position=np.full(3, math.nan), marker_age=math.inf, clearance=math.inf,
         )  # fmt: skip
-        return Decision(velocity=np.array([0.1, 0.02]), yaw_rate=0.3, pitch=0.05, report=report)
+        return Decision(velocity=np.array([0.1, 0.02]), yaw_rate=self.yaw_rate, pitch=0.05, report=report)
 
 
 @pytest.fixture
@@ -134,4 +135,13 @@ def test_trouble_and_arrival_are_told_once_when_they_begin(pipeline):
     assert told(Guided.FIELD, 3) == []
     assert told(Guided.BLIND, 3) == ["navigation: nothing to go by, the robot stands: why"]
     assert told(Guided.FIELD, 1) == []
-    assert told(Guided.ARRIVED, 2) == ["navigation: arrived: why"]
+    assert told(Guided.ARRIVED, 2) == ["navigation: at the end of the way: why"]
+
+
+def test_a_decision_that_is_no_number_is_not_walked(pipeline):
+    run(pipeline, WANDER)
+    pipeline._guidance._navigator.yaw_rate = math.nan
+    telemetry = run(pipeline, WANDER)
+    assert telemetry.motion.yaw_rate == 0.0
+    np.testing.assert_array_equal(telemetry.motion.velocity, 0.0)
+    assert any("no number" in event for event in telemetry.events)

@@ -84,6 +84,7 @@ def test_without_a_lidar_the_robot_stands_and_says_why():
     assert result.summary["figures"]["path_m"] < 0.02
     assert set(result.summary["figures"]["led_by_percent"]) == {"blind"}
     assert not result.summary["fell"]
+    assert not result.success
     last = result.data.telemetry[-1].navigation
     assert "LIDAR" in last.reason
 
