@@ -41,7 +41,7 @@ class ServoingConfig:
 
     near: float = 0.012  # m of the wanted distance: a robot that walks stops
     off: float = 0.035  # m of the wanted distance: a robot that stands sets out
-    follow_near: float = 0.04  # m, the same for a marker that may move
+    follow_near: float = 0.025  # m, the same for a marker that may move
     follow_off: float = 0.09  # m
     near_bearing_deg: float = 5.0  # degrees: a robot that walks stops
     off_bearing_deg: float = 12.0  # degrees: a robot that stands turns

@@ -196,6 +196,11 @@ def test_a_leader_that_comes_nearer_is_backed_off_from_slowly() -> None:
     assert motion.x == -CONFIG.back
 
 
+def test_a_leader_that_backs_up_does_not_reach_the_robot() -> None:
+    seen = _followed(-0.05, math.inf, 30.0)
+    assert min(r.distance for r in seen) > 0.5
+
+
 @pytest.mark.parametrize(
     "wrong",
     [{"off": 0.001}, {"moving": 0.001}, {"gain": 0.0}, {"turn_bearing_deg": 2.0}, {"greatest_pitch": 1.0}],
