@@ -12,13 +12,17 @@ from bluefoot_mpc.cli.world_picture import save_world_picture
 from bluefoot_mpc.exceptions import UnknownNameError
 from bluefoot_mpc.settings import to_table
 from bluefoot_mpc.sim.config import PLANNED_WORLDS, WorldConfig
-from bluefoot_mpc.sim.worlds.coverage import ROBOT_RADIUS, Grid, reachable
+from bluefoot_mpc.sim.worlds import footprint
+from bluefoot_mpc.sim.worlds.coverage import LIDAR_HEIGHT, ROBOT_RADIUS, Grid, reachable
 from bluefoot_mpc.sim.worlds.files import write_plan
 from bluefoot_mpc.sim.worlds.make import world_plan
 from bluefoot_mpc.sim.worlds.plan import WorldPlan
 
-_SCENARIOS = {"hidden": "approach", "arena": "follow"}
-"""Which scenario a kind of world was made for, where it is not ``wander``."""
+_PLURALS = {
+    "box": "boxes", "chair": "chairs", "cylinder": "cylinders", "partition": "partitions",
+    "screen": "screens", "table": "tables", "wall": "walls",
+}  # fmt: skip
+"""More than one of the kinds of things that are made; a file names its things as it likes."""
 
 
 def world(command: WorldCommand) -> Outcome:
@@ -27,7 +31,8 @@ def world(command: WorldCommand) -> Outcome:
     if plan is None:
         raise UnknownNameError("kind of world", command.kind, PLANNED_WORLDS)
     grid = reachable(plan)
-    lines = _describe(plan, grid)
+    warnings = _warnings(plan)
+    lines = [*_describe(plan, grid), *warnings]
     files = []
     if command.out is not None:
         write_plan(plan, command.out)
@@ -38,12 +43,12 @@ def world(command: WorldCommand) -> Outcome:
     lines += [f"wrote {file}" for file in files]
     source = command.out or command.kind
     seed = "" if str(source).endswith(".toml") else f" --seed {command.seed}"
-    scenario = _SCENARIOS.get(plan.name, "wander")
-    lines.append(f"walk in it: bluefoot run {scenario} --world {source}{seed}")
+    lines.append(f"walk in it: bluefoot run {_scenario(plan)} --world {source}{seed}")
     data: dict[str, Any] = {
         "plan": to_table(plan),
         "reachable_m2": round(grid.area, 3),
         "robot_radius_m": ROBOT_RADIUS,
+        "warnings": warnings,
         "files": [str(file) for file in files],
     }
     return Outcome(data=data, page=("\n".join(lines),))
@@ -51,13 +56,12 @@ def world(command: WorldCommand) -> Outcome:
 
 def _describe(plan: WorldPlan, grid: Grid) -> list[str]:
     x0, y0, x1, y1 = plan.bounds
-    things = ", ".join(
-        f"{count} {_plural(kind) if count > 1 else kind}" for kind, count in _things(plan).items()
-    )
+    things = ", ".join(_counted(kind, count) for kind, count in _things(plan).items())
+    number = len(plan.solids)
     lines = [
         f"{plan.name}, seed {plan.seed}: {x1 - x0:.2f} m x {y1 - y0:.2f} m;"
         f" the robot starts {-x0:.2f} m from the back and {-y0:.2f} m from the right side",
-        f"{len(plan.solids)} solids: {things or 'none'}",
+        f"{number} {'solid' if number == 1 else 'solids'}: {things or 'none'}",
         f"floor that the robot can get at: {grid.area:.1f} m²",
     ]
     if plan.marker is not None:
@@ -75,5 +79,24 @@ def _kind(name: str) -> str:
     return "wall" if name.startswith("wall") else re.sub(r"\d+$", "", name)
 
 
-def _plural(kind: str) -> str:
-    return f"{kind}es" if kind.endswith("x") else f"{kind}s"
+def _counted(kind: str, count: int) -> str:
+    """How many of a kind: "4 walls", "1 table"; of a kind that a file invents "4 × w"."""
+    if count == 1:
+        return f"1 {kind}"
+    return f"{count} {_PLURALS[kind]}" if kind in _PLURALS else f"{count} × {kind}"
+
+
+def _scenario(plan: WorldPlan) -> str:
+    """The scenario that a world is good for: with a marker that stands there is something to look for."""
+    if plan.marker is not None:
+        return "approach"
+    return "follow" if plan.name == "arena" else "wander"
+
+
+def _warnings(plan: WorldPlan) -> list[str]:
+    """What a robot that goes by its LIDAR will not see, and so walk into."""
+    return [
+        f"warning: '{solid.name}' lies {'below' if solid.z < LIDAR_HEIGHT else 'above'} the LIDAR's plane, "
+        f"{LIDAR_HEIGHT:g} m above the floor: the robot does not see it and may walk into it"
+        for solid in footprint.unseen(plan.solids, LIDAR_HEIGHT)
+    ]

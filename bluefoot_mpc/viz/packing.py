@@ -14,9 +14,10 @@ from bluefoot_mpc.types import FloatArray
 def pack(values: ArrayLike) -> dict[str, Any]:
     """An array as plotly.js and the replay read it: type, base64 data and, for tables, the shape.
 
-    Single precision keeps seven digits, more than a picture shows.
+    Single precision keeps seven digits, more than a picture shows; what is too great for it is infinite.
     """
-    array = np.ascontiguousarray(values, dtype="<f4")
+    with np.errstate(over="ignore"):
+        array = np.ascontiguousarray(values, dtype="<f4")
     packed: dict[str, Any] = {"dtype": "f4", "bdata": base64.b64encode(array.tobytes()).decode("ascii")}
     if array.ndim > 1:
         packed["shape"] = ", ".join(map(str, array.shape))

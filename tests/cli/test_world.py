@@ -35,6 +35,54 @@ def test_page_tells_what_stands_where_and_how_to_go_there(capsys):
     assert "bluefoot run approach" in text
 
 
+OWN = """
+bounds = [-2.0, -2.0, 4.0, 2.0]
+[marker]
+x = 3.5
+y = 1.0
+"""
+BAR = """
+[[solids]]
+name = "{}"
+shape = "box"
+x = {}
+y = 0.0
+z = {}
+size = [0.1, 1.0, 0.1]
+"""
+
+
+def own_world(tmp_path, *bars):
+    file = tmp_path / "own.toml"
+    file.write_text(OWN + "".join(BAR.format(*bar) for bar in bars))
+    return str(file)
+
+
+def test_things_that_the_lidar_cannot_see_are_told(capfd, tmp_path):
+    bars = [("bar", 1.2, 0.05), ("rail", 1.6, 0.25), ("shelf", 2.0, 0.35), ("lamp", 2.4, 0.6)]
+    status, data = run(capfd, own_world(tmp_path, *bars))
+    assert status == 0
+    below, above = data["warnings"]
+    assert below.startswith("warning: 'bar' lies below the LIDAR's plane, 0.25 m above the floor")
+    assert above.startswith("warning: 'shelf' lies above")
+    assert main(["world", own_world(tmp_path, *bars)]) == 0
+    assert "may walk into it" in " ".join(capfd.readouterr().out.split())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_worlds_that_are_made_warn_of_nothing(capfd, kind):
+    assert run(capfd, kind, "--seed", "1")[1]["warnings"] == []
+
+
+def test_own_things_are_counted_by_their_names(capsys, tmp_path):
+    assert main(["world", own_world(tmp_path, ("w0", 1.2, 0.25), ("w1", 2.4, 0.25))]) == 0
+    text = capsys.readouterr().out
+    assert "2 solids: 2 × w" in text
+    assert "bluefoot run approach" in text
+    assert main(["world", own_world(tmp_path, ("crate", 1.2, 0.25))]) == 0
+    assert "1 solid: 1 crate" in capsys.readouterr().out
+
+
 def test_file_is_written_and_can_be_read_again(capfd, tmp_path):
     file = tmp_path / "sub" / "mine.toml"
     assert run(capfd, "dead_ends", "--seed", "4", "--out", str(file))[0] == 0

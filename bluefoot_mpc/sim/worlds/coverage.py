@@ -95,8 +95,9 @@ def reachable(plan: WorldPlan, radius: float = ROBOT_RADIUS, cell: float = CELL)
 class Coverage:
     """What scans have shown of a grid's floor, so far.
 
-    Scans that must not be used, or are none, show nothing. A cell is seen when it lies in reach, inside the sector, and nearer than what its ray hit, or at most
-    one cell farther. A ray without an echo shows nothing: it may have been lost.
+    Scans that must not be used, or are none, show nothing. A cell is seen when it lies in reach, inside the
+    sector, and nearer than what its ray hit, or at most one cell farther. A ray without an echo shows
+    nothing: it may have been lost.
 
     Attributes:
         grid: whose floor is looked at.

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.settings import build, dump_toml, read_toml, to_table
 from bluefoot_mpc.sim.worlds import footprint
 from bluefoot_mpc.sim.worlds.plan import WorldPlan
@@ -46,8 +47,10 @@ def read_plan(path: Path) -> WorldPlan:
     if isinstance(table["solids"], list):
         table["solids"] = [_standing(solid) for solid in table["solids"]]
     try:
+        _require_known(table)
         plan = build(WorldPlan, table)
         _require_start(plan)
+        _require_free_marker(plan)
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: {error}") from error
     return plan
@@ -91,3 +94,23 @@ def _require_start(plan: WorldPlan) -> None:
     marker = plan.marker
     if marker is not None and np.hypot(marker.x, marker.y) - marker.radius < START_RADIUS:
         raise ConfigurationError(f"the marker stands in the start: {way_out.replace('solid', 'marker')}")
+
+
+def _require_known(table: Mapping[str, Any]) -> None:
+    """Refuse keys outside all tables that no plan has."""
+    known = [field.name for field in dataclasses.fields(WorldPlan)]
+    for key in table:
+        if key not in known:
+            raise UnknownNameError("key", key, known)
+
+
+def _require_free_marker(plan: WorldPlan) -> None:
+    """Refuse a marker whose ball is inside a thing, where nothing sees it; it may stand on one."""
+    marker = plan.marker
+    if marker is None:
+        return
+    for solid in plan.solids:
+        is_level = abs(marker.z - solid.z) < marker.radius + 0.5 * solid.size[2]
+        away = footprint.distance(np.array([[marker.x, marker.y]]), solid)[0]
+        if is_level and away < marker.radius:
+            raise ConfigurationError(f"the marker stands in '{solid.name}': move one of them")

@@ -31,6 +31,16 @@ def crossing(solids: Iterable[Solid], height: float) -> tuple[Solid, ...]:
     return tuple(s for s in solids if abs(s.z - height) < 0.5 * s.size[2])
 
 
+def unseen(solids: Iterable[Solid], height: float) -> tuple[Solid, ...]:
+    """The solids in the robot's way that a level plane passes over or under: a LIDAR never sees them.
+
+    Args:
+        solids: to choose from.
+        height: m, of the plane above the floor.
+    """
+    return tuple(s for s in in_the_way(solids) if abs(s.z - height) >= 0.5 * s.size[2])
+
+
 def distance(points: FloatArray, solid: Solid) -> FloatArray:
     """Distance of points in the plane from a solid's footprint (n,), m; negative inside.
 

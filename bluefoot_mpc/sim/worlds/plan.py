@@ -13,6 +13,11 @@ Shape = Literal["box", "cylinder"]
 TAKEN_NAMES = ("floor", "marker", "marker_post")
 """Names that the simulator gives to what is no solid of a plan."""
 
+FARTHEST = 60.0
+"""m from the origin, along each axis, within which the middle of anything must be."""
+
+_BOUNDS = ("least_x", "least_y", "greatest_x", "greatest_y")
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Solid:
@@ -39,6 +44,8 @@ class Solid:
         require_finite(x=self.x, y=self.y, z=self.z, yaw=self.yaw)
         length, width, height = self.size
         require_positive(length=length, width=width, height=height)
+        require_range(-FARTHEST, FARTHEST, x=self.x, y=self.y, z=self.z)
+        require_range(0.0, 2.0 * FARTHEST, length=length, width=width, height=height)
         if self.shape == "cylinder" and length != width:
             raise ConfigurationError(
                 f"size = {list(self.size)}: a cylinder is as wide as long: [diameter, diameter, height]"
@@ -65,6 +72,7 @@ class Marker:
         if not self.z >= self.radius:
             raise ConfigurationError(f"marker: z = {self.z:g} must be at least its radius {self.radius:g}")
         require_finite(z=self.z)
+        require_range(-FARTHEST, FARTHEST, x=self.x, y=self.y, z=self.z)
         red, green, blue = self.colour
         require_range(0.0, 1.0, red=red, green=green, blue=blue)
 
@@ -94,7 +102,21 @@ class WorldPlan:
             raise ConfigurationError(f"world '{self.name}': two solids have the name '{twice}'")
         require_finite(bounds=self.bounds)
         least_x, least_y, greatest_x, greatest_y = self.bounds
+        if least_x >= greatest_x or least_y >= greatest_y:
+            raise ConfigurationError(
+                f"world '{self.name}': bounds = {list(self.bounds)}: least x and least y come first, "
+                "then greatest x and greatest y"
+            )
+        require_range(-FARTHEST, FARTHEST, **dict(zip(_BOUNDS, self.bounds, strict=True)))
         if not (least_x < 0.0 < greatest_x and least_y < 0.0 < greatest_y):
             raise ConfigurationError(
                 f"world '{self.name}': its bounds must hold the origin, where the robot starts"
+            )
+        marker = self.marker
+        if marker is not None and not (
+            least_x <= marker.x <= greatest_x and least_y <= marker.y <= greatest_y
+        ):
+            raise ConfigurationError(
+                f"world '{self.name}': the marker at x = {marker.x:g}, y = {marker.y:g} is outside the "
+                f"bounds {list(self.bounds)}: move it, or widen them"
             )

@@ -47,7 +47,7 @@ def test_a_small_file_is_filled_up(tmp_path):
         ("3.0, 1.0]", "nan, 1.0]", "must be finite"),
         ("3.0, 1.0]", "3.0]", "must have 4 entries"),
         ("-1.0, -1.0, 3.0, 1.0", "1.0, -1.0, 3.0, 1.0", "must hold the origin"),
-        ("3.0, 1.0]", "300.0, 1.0]", "at most 60 m"),
+        ("3.0, 1.0]", "59.5, 1.0]", "at most 60 m"),
         ("x = 2.0", "x = nan", "must be finite"),
         ("x = 2.0", "x = inf", "must be finite"),
         ("x = 2.0", "", "missing value: solids\\[0\\].x"),
@@ -62,6 +62,16 @@ def test_a_small_file_is_filled_up(tmp_path):
         ("size = [0.3, 0.3, 0.4]", "", "missing value: solids\\[0\\].size"),
         ("[[solids]]", "[marker]\nx = 0.1\ny = 0.1\n\n[[solids]]", "the marker stands in the start"),
         ("[[solids]]", "[marker]\nx = 1.0\ny = 0.0\nz = 0.01\n\n[[solids]]", "at least its radius"),
+        ("[[solids]]", "[marker]\nx = 2.0\ny = 0.5\n\n[[solids]]", "the marker stands in 'crate': move"),
+        ("[[solids]]", "[marker]\nx = 2.2\ny = 0.5\n\n[[solids]]", "the marker stands in 'crate': move"),
+        ("[[solids]]", "[marker]\nx = 20.0\ny = 0.0\n\n[[solids]]", "is outside the bounds .* widen them"),
+        ("[[solids]]", "[marker]\nx = 1.0\ny = -1.1\n\n[[solids]]", "is outside the bounds"),
+        ("x = 2.0", "x = 1e308", "x = 1e\\+308 must lie in -60..60"),
+        ("y = 0.5", "y = -61.0", "y = -61.0 must lie in -60..60"),
+        ("[0.3, 0.3, 0.4]", "[0.3, 1e200, 0.4]", "width = 1e\\+200 must lie in 0..120"),
+        ("3.0, 1.0]", "1e308, 1.0]", "greatest_x = 1e\\+308 must lie in -60..60"),
+        ("-1.0, -1.0, 3.0, 1.0", "3.0, -1.0, -1.0, 1.0", "least x and least y come first"),
+        ("bounds = ", "colour = 3\nbounds = ", "unknown key 'colour'. .*Valid: bounds, marker"),
         ("bounds = ", "bounds == ", "is not a TOML file"),
     ],
 )  # fmt: skip
@@ -82,6 +92,16 @@ def test_unknown_keys_are_told_with_the_valid_ones(tmp_path, old, new, hint):
     file.write_text(SMALL.replace(old, new))
     with pytest.raises(ConfigurationError, match=f"unknown key.*{hint}"):
         read_plan(file)
+
+
+def test_a_marker_may_be_under_over_and_beside_a_thing(tmp_path):
+    file = tmp_path / "good.toml"
+    file.write_text(SMALL.replace("y = 0.5", "y = 0.5\nz = 0.6") + "\n[marker]\nx = 2.0\ny = 0.5\n")
+    assert read_plan(file).marker == Marker(x=2.0, y=0.5)
+    file.write_text(SMALL + "\n[marker]\nx = 2.0\ny = 0.5\nz = 0.47\n")
+    assert read_plan(file).marker == Marker(x=2.0, y=0.5, z=0.47)
+    file.write_text(SMALL + "\n[marker]\nx = 2.22\ny = 0.5\n")
+    assert read_plan(file).marker == Marker(x=2.22, y=0.5)
 
 
 def test_unknown_shape_is_told_with_the_valid_ones(tmp_path):
