@@ -28,12 +28,15 @@ class MarkerTaskConfig:
     search: SearchConfig = field(default_factory=SearchConfig)
     remember: float = 90.0  # s for which a marker that stands is gone to without a sighting
     remember_beyond: float = 0.5  # m more than the wanted distance: nearer it must be in view
+    blink: float = 0.5  # s without a picture after which what was found in the last one counts no more
+    blind: float = 2.0  # s without a picture after which the robot stands
     detour: float = 1.15  # times the straight line: a longer way is one around something
     detour_least: float = 0.2  # m, that do not count
 
     def __post_init__(self) -> None:
         require_positive(
-            remember=self.remember, remember_beyond=self.remember_beyond, detour_least=self.detour_least
+            remember=self.remember, remember_beyond=self.remember_beyond, detour_least=self.detour_least,
+            blink=self.blink, blind=self.blind,
         )  # fmt: skip
         require_range(1.0, 10.0, detour=self.detour)
 
@@ -47,7 +50,8 @@ class MarkerWish:
     behind it as always.
 
     Attributes:
-        guided: MARKER while it leads, ARRIVED while the robot stands at its distance, SEARCH otherwise.
+        guided: MARKER while it leads, ARRIVED while the robot stands at its distance, BLIND without pictures,
+            SEARCH otherwise.
         motion: m/s and rad/s, heading frame.
         share: of `motion` in the command, 0..1; that of its prediction where the marker is hidden shortly.
         goal: (2,) m in the odometry frame; None without one.
@@ -98,6 +102,7 @@ class MarkerTask:
         self._servo = Servo()
         self._sighting: Sighting | None = None
         self._reason = "no picture yet"
+        self._pictured: float | None = None
 
     def step(self, guide: Guide, frame: SensorFrame, estimate: BodyState, dt: float) -> MarkerWish:
         """One tick.
@@ -111,10 +116,16 @@ class MarkerTask:
         self._target.remember(estimate)
         if frame.camera is not None:
             self._look(frame.camera, guide.task is GuideTask.FOLLOW)
+        unseeing = self._without_picture(frame)
+        if unseeing > self._config.blink:
+            self._sighting = None
         seen = self._sighting
         row = math.nan if seen is None else seen.row
         wanted = servoing.camera_pitch(row, 1 if seen is None else seen.height, self._config.servoing)
         self._servo = servoing.pitched(self._servo, wanted, dt, self._config.servoing)
+        if unseeing > self._config.blind:
+            self._reason = f"no picture of the camera for {unseeing:.0f} s"
+            return self._wish(estimate, Guided.BLIND, (Motion(), 1.0, None), 0.0)
         if self._leads(guide, estimate):
             self._search.reset()
             return self._lead(guide, estimate)
@@ -129,6 +140,12 @@ class MarkerTask:
             return False
         relative = self._target.relative(estimate)
         return relative is not None and relative.distance > guide.distance + self._config.remember_beyond
+
+    def _without_picture(self, frame: SensorFrame) -> float:
+        """For how long there was no usable picture, s; counted from the beginning of the task."""
+        if self._pictured is None or (frame.camera is not None and frame.camera.valid):
+            self._pictured = frame.time
+        return frame.time - self._pictured
 
     def _look(self, image: CameraImage, moves: bool) -> None:
         self._sighting = self._finder.find(image, self._expected(image))

@@ -111,7 +111,7 @@ class Navigator:
         lead = self._leading.step(guide, self._around, scan)
         self._lead = lead = self._out_of_the_corner(lead, time)
         speed = guide.speed
-        if self._around.open_ground:
+        if self._around.open_ground and lead.guided is not Guided.MARKER:
             # Open ground looks like this, and so does a LIDAR that is dirty, or was covered from the start.
             speed = min(speed, self._config.scan.open_speed)
             self._lead = lead = lead._replace(reason=lead.reason or "open ground, hardly an echo: slowly")

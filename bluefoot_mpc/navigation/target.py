@@ -35,6 +35,7 @@ class TargetConfig:
     lowest: float = -0.3  # m, of a marker above the floor
     highest: float = 1.5  # m
     history: float = 0.6  # s of poses kept: pictures come late
+    ahead: float = 0.05  # s that a picture's time stamp may lie ahead of the newest pose
 
     def __post_init__(self) -> None:
         require_positive(
@@ -44,6 +45,7 @@ class TargetConfig:
             gate=self.gate, gate_least=self.gate_least, history=self.history,
         )  # fmt: skip
         require_range(1, 100, strays=self.strays)
+        require_range(0.0, 1.0, ahead=self.ahead)
         require_range(self.lowest, 10.0, highest=self.highest)
 
 
@@ -126,7 +128,7 @@ class Target:
 
     def trusted(self, time: float) -> bool:
         """True while it is seen or may still be predicted."""
-        return self.age(time) <= self._config.trust
+        return -self._config.ahead <= self.age(time) <= self._config.trust
 
     def remember(self, estimate: BodyState) -> None:
         """Keep the present pose: a picture tells of one that was."""
@@ -137,8 +139,11 @@ class Target:
             self._poses.popleft()
 
     def pose_at(self, time: float) -> Pose | None:
-        """The pose at a time of the last moments, between the two kept ones around it; None before them."""
-        if not self._poses or time < self._poses[0].time - 0.03:
+        """The pose at a time of the last moments, between the two kept ones around it; else None."""
+        if (
+            not self._poses
+            or not self._poses[0].time - 0.03 <= time <= self._poses[-1].time + self._config.ahead
+        ):
             return None
         after = next((k for k, pose in enumerate(self._poses) if pose.time >= time), None)
         if after is None or after == 0:
