@@ -88,10 +88,13 @@ class CommandInbox:
         self._last_sticks = self._last_heartbeat = self.start
         self._settle()
 
-    def heartbeat(self, now: float) -> None:
-        """A station is there."""
+    def heartbeat(self, now: float) -> str:
+        """A station is there; gives what a person should know of it, mostly nothing."""
+        silence = now - self._last_heartbeat - self.config.heartbeat_timeout
         self._last_heartbeat = now
+        remark = self._return_after(silence)
         self._settle()
+        return remark
 
     def manual(self, message: Any, now: float) -> str:
         """Take a MANUAL_CONTROL; gives what a person should know of it, mostly nothing.
@@ -105,16 +108,7 @@ class CommandInbox:
             return ""
         silence = now - self._last_sticks
         self._last_sticks = now
-        remark = ""
-        if silence > self.config.recall_after:
-            self._sticks.extend([_CENTRE] * _MEDIAN_OF)
-            if self.mode is Mode.WALK:
-                # Whoever comes back must not find the robot walking off.
-                self.tasks.pause()
-                self.mode = Mode.STAND
-                remark = f"no command for {silence:.1f} s: standing; ask to walk again"
-        elif silence > _STUTTER:
-            self.tasks.shorten()
+        remark = self._return_after(silence)
         if any(sticks):
             self._sticks.append(sticks)
         else:
@@ -123,6 +117,19 @@ class CommandInbox:
             remark = "moved by hand: the robot does not find its own way any more"
         self._settle()
         return remark
+
+    def _return_after(self, silence: float) -> str:
+        """Words are back after the robot had to do without for so long (s); gives what to tell of it."""
+        if silence > self.config.recall_after:
+            self._sticks.extend([_CENTRE] * _MEDIAN_OF)
+            if self.mode is Mode.WALK:
+                # Whoever comes back must not find the robot walking off.
+                self.tasks.pause()
+                self.mode = Mode.STAND
+                return f"no command for {silence:.1f} s: standing; ask to walk again"
+        elif silence > _STUTTER:
+            self.tasks.shorten()
+        return ""
 
     def command(self, now: float) -> tuple[MotionCommand, float]:
         """The motion wanted and its age (s): that of the sticks, or of a station that fell silent.
@@ -137,6 +144,7 @@ class CommandInbox:
 
         None: the answer comes later, from whoever owns the robot.
         """
+        self.tasks.refusal = ""
         parameters = [getattr(message, f"param{i}") for i in range(1, 8)]
         for number, action in (
             (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, self._arm_disarm),

@@ -13,7 +13,7 @@ from bluefoot_mpc.io.station.commands import CommandInbox
 from bluefoot_mpc.io.station.config import BITS_PER_BYTE, StationConfig
 from bluefoot_mpc.io.station.framing import FrameReader, Received
 from bluefoot_mpc.io.station.mission import MissionServer
-from bluefoot_mpc.io.station.protocol import ACCEPTED, FAILED, IN_PROGRESS
+from bluefoot_mpc.io.station.protocol import ACCEPTED, DENIED, FAILED, IN_PROGRESS
 from bluefoot_mpc.io.station.schedule import Schedule, Stream, TokenBucket
 from bluefoot_mpc.io.station.sequence import SequenceGuard
 from bluefoot_mpc.io.station.signing import Signer
@@ -161,12 +161,15 @@ class RobotEnd:
     def _take(self, message: Any, now: float) -> None:
         kind, config = message.get_type(), self._config
         if kind == "HEARTBEAT":
-            self.inbox.heartbeat(now)
+            if remark := self.inbox.heartbeat(now):
+                self.say(mavlink.MAV_SEVERITY_WARNING, remark)
         elif kind == "MANUAL_CONTROL" and message.target == config.robot_system:
             if remark := self.inbox.manual(message, now):
                 self.say(mavlink.MAV_SEVERITY_WARNING, remark)
         elif kind == "COMMAND_LONG" and self._is_meant(message):
             result = self.inbox.execute(message)
+            if result == DENIED and self.inbox.tasks.refusal:
+                self.say(mavlink.MAV_SEVERITY_WARNING, self.inbox.tasks.refusal)
             answer = IN_PROGRESS if result is None else result
             self.writer.answer(mavlink.MAVLink_command_ack_message(message.command, answer))
         elif kind.startswith("MISSION_") and self._is_meant(message):

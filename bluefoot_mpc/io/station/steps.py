@@ -31,6 +31,9 @@ _FORMS = {"gait": "NAME", "points": "FORWARD,LEFT/FORWARD,LEFT"}
 REACH = 1000.0
 """m; farther from the start there is no waypoint."""
 
+NEAREST = 0.4
+"""m; nearer to the marker the robot keeps off it as off any other thing."""
+
 
 class Steps:
     """A sequence of commands, each held for a while. Every step returns the sequence again.
@@ -125,6 +128,11 @@ class Steps:
 
     def _guided(self, seconds: float, guide: Guide) -> Steps:
         require_positive(speed=guide.speed, distance=guide.distance)
+        if guide.distance < NEAREST:
+            raise ConfigurationError(
+                f"distance = {guide.distance:g} must be at least {NEAREST:g} m: nearer to the marker the "
+                "robot keeps off it as off any other thing"
+            )
         return self.add(seconds, MotionCommand(mode=Mode.WALK, guide=guide))
 
 

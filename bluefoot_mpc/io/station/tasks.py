@@ -14,6 +14,7 @@ import numpy as np
 from pymavlink.dialects.v20 import common as mavlink
 
 from bluefoot_mpc.io.station.protocol import ACCEPTED, DENIED, FAILED, TASKS
+from bluefoot_mpc.io.station.steps import NEAREST
 from bluefoot_mpc.types import FloatArray, Guide, Guided, GuideTask, Telemetry
 
 SPEED_MAX = 1.0
@@ -40,12 +41,14 @@ class TaskBoard:
         speed: m/s, at most, on the way to waypoints.
         guide: the task in force; None while the robot is told where to go.
         missed: numbers of the waypoints that were given up since the start.
+        refusal: why the last order was denied, where its numbers alone do not say it; else empty.
     """
 
     points: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     speed: float = _DEFAULT.speed
     guide: Guide | None = None
     missed: list[int] = field(default_factory=list)
+    refusal: str = ""
     _paused: Guide | None = None
     _begun: int = 0
     _first: int = 0
@@ -158,6 +161,9 @@ class TaskBoard:
         task = GuideTask(TASKS[int(number)])
         # Numbers come in single precision.
         speed, distance = round(speed, 6) or _DEFAULT.speed, round(distance, 6) or _DEFAULT.distance
+        if task is not GuideTask.WANDER and distance < NEAREST:
+            self.refusal = f"{task}: at least {NEAREST:g} m from the marker, not {distance:g} m"
+            return DENIED
         wanted = Guide(task=task, speed=speed, distance=distance)
         if self.guide is None or _without_points(self.guide) != _without_points(wanted):
             self.guide, self._paused = wanted, None

@@ -73,6 +73,7 @@ def test_text_is_read_from_an_option_or_a_file(tmp_path, as_file):
         ("goto 40 points=1,2 distance=2", "unknown value of 'goto'.*points, speed"),
         ("wander 9 speed=nan", "speed"),
         ("follow 9 distance=-1", "distance"),
+        ("approach 9 distance=0.3", "distance = 0.3 must be at least 0.4 m"),
     ],
 )
 def test_what_cannot_be_read_is_named(text, complaint):

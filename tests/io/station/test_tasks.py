@@ -96,11 +96,21 @@ def test_speed_and_distance_have_defaults(inbox):
     [
         (0,), (GOTO,), (5,), (1.5,), (-1,), (math.nan,), (WANDER, -0.1), (WANDER, 1.1), (WANDER, math.nan),
         (FOLLOW, 0.1, 6.0), (FOLLOW, 0.1, math.nan), (FOLLOW, 0.1, 0.6, 1.0),
+        (FOLLOW, 0.1, 0.05), (APPROACH, 0.0, 0.39),
     ],
 )  # fmt: skip
 def test_tasks_that_mean_nothing_are_denied(inbox, parameters):
     assert order(inbox, TASK, *parameters) == DENIED
     assert motion(inbox).mode is Mode.STAND
+
+
+def test_a_distance_that_is_too_small_is_denied_with_the_cause(inbox):
+    order(inbox, TASK, FOLLOW, 0.1, 0.39)
+    assert inbox.tasks.refusal == "follow: at least 0.4 m from the marker, not 0.39 m"
+    assert order(inbox, TASK, FOLLOW, 0.1, np.float32(0.4)) == ACCEPTED
+    assert inbox.tasks.refusal == ""
+    # Wandering keeps no distance to a marker.
+    assert order(inbox, TASK, WANDER, 0.1, 0.05) == ACCEPTED
 
 
 def test_the_list_is_gone_through_at_the_speed_that_was_asked_for(inbox):
@@ -265,6 +275,34 @@ def test_after_a_long_silence_the_task_has_to_be_asked_for_anew(inbox):
     assert motion(inbox, now).guide is not None
 
 
+def sticks_alone(inbox, start, seconds):
+    """Centred sticks for a while, no heartbeat; gives the time after it."""
+    for tick in range(round(seconds / 0.04)):
+        inbox.manual(mavlink.MAVLink_manual_control_message(1, 0, 0, 0, 0, 0), start + 0.04 * tick)
+    return start + seconds
+
+
+def test_when_heartbeats_alone_were_missing_the_way_goes_on_from_the_next_waypoint(inbox):
+    order(inbox, START)
+    now, _ = hold(inbox, 0.0)
+    inbox.progress(tick(motion(inbox), 2, at=(1.0, 0.0)))
+    now = sticks_alone(inbox, now, 2.92)
+    # The robot has let go of its task.
+    assert CommandWatchdog().step(*inbox.command(now)).guide is None
+    assert inbox.heartbeat(now) == ""
+    assert motion(inbox, now).guide.waypoints.tolist() == POINTS[1:].tolist()
+
+
+def test_when_heartbeats_alone_were_missing_for_long_the_robot_stands(inbox):
+    order(inbox, START)
+    now, _ = hold(inbox, 0.0)
+    now = sticks_alone(inbox, now, 4.0)
+    assert "ask to walk again" in inbox.heartbeat(now)
+    assert (motion(inbox, now).mode, motion(inbox, now).guide) == (Mode.STAND, None)
+    assert order(inbox, PAUSE, 1) == ACCEPTED
+    assert motion(inbox, now).guide is not None
+
+
 class Pair:
     """Both ends on a line without loss; the robot does at once what it is told."""
 
@@ -330,6 +368,13 @@ def test_a_waypoint_without_a_way_to_it_is_told():
     pair.run(2.0, wish)
     assert "waypoint 2 given up: no way to it" in pair.texts
     assert pair.ground.picture.mission.complete
+
+
+def test_a_distance_that_is_too_small_is_told():
+    pair = Pair()
+    assert pair.run(1.0, walk_with(GuideTask.FOLLOW, distance=0.1)).guide is None
+    assert pair.ground.orders[-1].result == "denied"
+    assert "follow: at least 0.4 m from the marker, not 0.1 m" in pair.texts
 
 
 def test_the_station_ends_a_task_with_a_stick_or_a_mode():
