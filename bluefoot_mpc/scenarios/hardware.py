@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.io.board.driver import SensorBoard
 from bluefoot_mpc.io.calibration import Calibration, load_calibration
-from bluefoot_mpc.io.camera import Camera
-from bluefoot_mpc.io.clock import MonotonicClock
+from bluefoot_mpc.io.camera import Camera, CameraConfig
+from bluefoot_mpc.io.clock import Clock, MonotonicClock
 from bluefoot_mpc.io.dynamixel.bus import BusConfig
 from bluefoot_mpc.io.lidar.driver import Lidar
 from bluefoot_mpc.io.serial_link import SerialLink
@@ -88,7 +88,7 @@ def live_robot(
             opened.append(SerialLink(config.lidar_port, LIDAR_BAUD, clock))
             lidar = Lidar(opened[-1], clock)
         links, board_link = opened[: len(servos)], opened[len(servos)]
-        camera = Camera(config.camera, clock) if config.camera else None
+        camera = make_camera(config, clock)
         board_driver = SensorBoard(board_link, clock)
         devices = drivers(
             links, clock, calibration, board_driver, lidar=lidar, camera=camera, model=model, bus=PATIENT
@@ -99,6 +99,18 @@ def live_robot(
         for link in opened:
             link.close()
         raise
+
+
+def make_camera(config: DevicesConfig, clock: Clock) -> Camera | None:
+    """The configured camera, not yet opened; None without one.
+
+    Args:
+        config: which one, and how old its pictures are when they arrive.
+        clock: of the time stamps.
+    """
+    if not config.camera:
+        return None
+    return Camera(config.camera, clock, CameraConfig(delay=config.camera_delay))
 
 
 def _require_different(ports: Sequence[str]) -> None:

@@ -23,6 +23,7 @@ class DevicesConfig:
     board_port: str = ""  # of the sensor and power board; empty = none
     lidar_port: str = ""  # empty = none
     camera: str = ""  # index or path of a video device; empty = none
+    camera_delay: float = 0.07  # s from exposure to arrival: two pictures of a camera at 30 Hz; not measured
     calibration: str = "calibration.toml"  # file that `bluefoot servo calibrate` wrote
     period: float = 0.020  # s, command period
     read_lead: float = 0.007  # s before the end of a period at which reading starts, at least
@@ -39,6 +40,7 @@ class DevicesConfig:
         )
         require_range(0.002, 0.2, period=self.period)
         require_range(1.0, 3.0, lead_margin=self.lead_margin)
+        require_range(0.0, 1.0, camera_delay=self.camera_delay)
         require_range(7843, 1_000_000, baud=self.baud)
         if len(self.ports) not in (0, 1, 2, 4):
             raise ConfigurationError(
