@@ -6,7 +6,8 @@ topic of their own (`bluefoot_mpc.runtime.packed_pictures`). Text is made of a f
 at a time, which takes half the time that it takes tick by tick, when the
 controller has just had the processor's caches. Packing and compressing, of
 pictures too, happen in a thread, half a second of the run at a time, and every packed half second
-goes to the file at once. So a killed process loses little, and
+goes to the file at once. Where the disk does not follow for seconds, pictures are packed when they
+come: raw ones that wait would fill the memory. So a killed process loses little, and
 `bluefoot_mpc.runtime.log.read_log` reads what is there.
 """
 
@@ -59,6 +60,8 @@ _PORTION = 0.1
 """s of the run that become text together."""
 _TINY = 1e-6
 _QUEUE_LENGTH = 64
+_RAW_LIMIT = 48_000_000
+"""Bytes of raw pictures that may wait: 5 s of 640 by 480 at ten a second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +104,8 @@ class Recorder:
         self._batch_start = self._portion_start = float("-inf")
         self._portion: list[tuple[str, float, Any]] = []
         self._batch: list[_Message] = []
+        # Bytes of raw pictures: what was put in counts in the caller's thread, what is packed in the other.
+        self._raw_in = self._raw_out = 0
         self._queue: queue.Queue[list[_Message] | None] = queue.Queue(_QUEUE_LENGTH)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -135,7 +140,12 @@ class Recorder:
             self._put("/frame", time, frame)
             return
         self._put("/frame", time, replace(frame, camera=None))
-        self._put(packed_pictures.TOPIC, time, _Picture(image, time))
+        picture, size = _Picture(image, time), image.pixels.nbytes
+        if self._raw_in - self._raw_out + size > _RAW_LIMIT:
+            self._put(packed_pictures.TOPIC, time, picture.text())
+            return
+        self._raw_in += size
+        self._put(packed_pictures.TOPIC, time, picture)
 
     def command(self, motion: MotionCommand, joints: JointCommand, safe: SafetyRequest) -> None:
         """Record what went into the controller beside the newest frame, and its answer.
@@ -228,11 +238,15 @@ class Recorder:
                 continue
             try:
                 for channel, time, data in batch:
-                    text = data if isinstance(data, bytes) else data.text()
+                    text = data if isinstance(data, bytes) else self._packed(data)
                     self._writer.add_message(channel, time, text, time)
                 self._writer.flush()
             except OSError as error:
                 self._error = error
+
+    def _packed(self, picture: _Picture) -> bytes:
+        self._raw_out += picture.image.pixels.nbytes
+        return picture.text()
 
     def _failure(self, error: OSError) -> LogError:
         return LogError(f"cannot write the log {self.path}: {error.strerror or error}")

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import orjson
@@ -14,6 +15,7 @@ import pytest
 from mcap.reader import make_reader
 
 from bluefoot_mpc.exceptions import LogError
+from bluefoot_mpc.runtime import recorder as recording
 from bluefoot_mpc.runtime.log import read_log
 from bluefoot_mpc.runtime.recorder import BATCH, Recorder
 from tests.runtime.made_up_run import CONFIG, PERIOD, iterate_ticks, make_run, record_ticks, same_runs
@@ -171,3 +173,35 @@ def test_a_disk_that_fills_up_during_the_run_is_reported(
     monkeypatch.setattr(recorder._writer, "flush", full)
     with pytest.raises(LogError, match="No space left"), recorder:
         record_ticks(recorder, run)
+
+
+def test_a_slow_disk_does_not_fill_the_memory_with_raw_pictures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = make_run(400)
+    sizes = [frame.camera.pixels.nbytes for frame in run.frames if frame.camera is not None]
+    monkeypatch.setattr(recording, "_RAW_LIMIT", 3 * max(sizes))
+    goes_on = threading.Event()
+    with Recorder(tmp_path / "log.mcap", CONFIG, PERIOD) as recorder:
+        write = recorder._writer.add_message
+
+        def slow(*message: object) -> None:
+            goes_on.wait(30.0)
+            write(*message)
+
+        monkeypatch.setattr(recorder._writer, "add_message", slow)
+        record_ticks(recorder, run)
+        waiting = sum(raw_pictures(recorder))
+        goes_on.set()
+    assert len(sizes) > 10
+    assert waiting <= 3 * max(sizes)
+    # Packed early or late, every picture is there.
+    assert same_runs(read_log(tmp_path / "log.mcap", strict=True), run)
+    assert recorder._raw_in == recorder._raw_out > 0
+
+
+def raw_pictures(recorder: Recorder) -> list[int]:
+    """Bytes of each picture that waits unpacked, but for the half second that is being written."""
+    waiting = [data for batch in recorder._queue.queue if batch for _, _, data in batch]
+    waiting += [data for _, _, data in recorder._batch] + [record for _, _, record in recorder._portion]
+    return [data.image.pixels.nbytes for data in waiting if isinstance(data, recording._Picture)]
