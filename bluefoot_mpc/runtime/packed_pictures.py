@@ -18,6 +18,7 @@ import numpy as np
 import orjson
 
 from bluefoot_mpc.exceptions import LogError
+from bluefoot_mpc.runtime.pictures import is_picture
 from bluefoot_mpc.types import CameraImage
 
 TOPIC, SCHEMA_NAME = "/camera", "foxglove.CompressedImage"
@@ -42,6 +43,8 @@ SCHEMA: dict[str, Any] = {
 }
 
 _NANOSECONDS = 1_000_000_000
+_LATEST = 1e9
+"""s; a message's time of exposure has no room for more, nor for what is no number."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -74,9 +77,15 @@ class PackedPicture:
 
 
 def can_be_packed(image: CameraImage) -> bool:
-    """Whether PNG can hold it: bytes in three colours, at least one pixel."""
-    pixels = image.pixels
-    return pixels.dtype == np.uint8 and pixels.ndim == 3 and pixels.shape[2] == 3 and pixels.size > 0
+    """Whether a message can hold it: bytes in three colours, at least one pixel, taken at some time."""
+    return is_picture(image.pixels) and abs(image.time) < _LATEST
+
+
+def loggable(image: CameraImage) -> CameraImage:
+    """What a frame's text can hold of a picture: all of it, or nothing where it has no bytes as pixels."""
+    if isinstance(image.pixels, np.ndarray) and image.pixels.dtype == np.uint8:
+        return image
+    return CameraImage(time=image.time, pixels=np.zeros((0, 0, 3), dtype=np.uint8), valid=False)
 
 
 def pack(image: CameraImage, frame: float) -> bytes:

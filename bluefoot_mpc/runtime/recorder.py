@@ -98,7 +98,7 @@ class Recorder:
         self.path = Path(path)
         self._config: bytes | None = orjson.dumps(dict(config))
         self._outcome: dict[str, str] = {}
-        self._error: OSError | None = None
+        self._error: Exception | None = None
         self._closed = False
         self._time: float | None = None
         self._batch_start = self._portion_start = float("-inf")
@@ -137,7 +137,8 @@ class Recorder:
                 self._batch_start = time
         image = frame.camera
         if image is None or not packed_pictures.can_be_packed(image):
-            self._put("/frame", time, frame)
+            kept = frame if image is None else replace(frame, camera=packed_pictures.loggable(image))
+            self._put("/frame", time, kept)
             return
         self._put("/frame", time, replace(frame, camera=None))
         picture, size = _Picture(image, time), image.pixels.nbytes
@@ -241,15 +242,16 @@ class Recorder:
                     text = data if isinstance(data, bytes) else self._packed(data)
                     self._writer.add_message(channel, time, text, time)
                 self._writer.flush()
-            except OSError as error:
+            except Exception as error:  # the run must learn of it, or it would wait for this thread for ever
                 self._error = error
 
     def _packed(self, picture: _Picture) -> bytes:
         self._raw_out += picture.image.pixels.nbytes
         return picture.text()
 
-    def _failure(self, error: OSError) -> LogError:
-        return LogError(f"cannot write the log {self.path}: {error.strerror or error}")
+    def _failure(self, error: Exception) -> LogError:
+        cause = error.strerror if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
+        return LogError(f"cannot write the log {self.path}: {cause or error}")
 
 
 def _abandon(file: IO[bytes]) -> None:

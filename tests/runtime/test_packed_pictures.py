@@ -6,6 +6,7 @@ import base64
 import tracemalloc
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -49,6 +50,35 @@ def test_other_pictures_stay_in_their_frames(tmp_path: Path) -> None:
         log = read_log(path)
         assert not log.packed
         assert same(log.frame(0).camera, image)
+
+
+@pytest.mark.parametrize("time", [np.nan, np.inf, -np.inf, 1e300])
+def test_pictures_of_no_time_stay_in_their_frames(tmp_path: Path, time: float) -> None:
+    image = CameraImage(time=time, pixels=RNG.integers(0, 256, (4, 5, 3), dtype=np.uint8), valid=True)
+    assert not can_be_packed(image)
+    with Recorder(tmp_path / "log.mcap", CONFIG, PERIOD) as recorder:
+        recorder.frame(replace(frame(RNG, 0.0, 4, False), camera=image))
+        recorder.frame(frame(RNG, 0.02, 4, False))
+    log = read_log(tmp_path / "log.mcap", strict=True)
+    assert len(log.frames) == 2
+    assert same(log.frame(0).camera, image)
+
+
+@pytest.mark.parametrize(
+    "pixels",
+    [None, [[1, 2, 3]], "none", np.full((4, 5, 3), 0.5), np.full((4, 5, 3), 777, np.uint16)],
+    ids=["none", "list", "text", "float", "uint16"],
+)
+def test_of_what_is_no_picture_the_log_keeps_that_one_came(tmp_path: Path, pixels: Any) -> None:
+    image = CameraImage(time=1.5, pixels=pixels, valid=True)
+    with Recorder(tmp_path / "log.mcap", CONFIG, PERIOD) as recorder:
+        recorder.frame(replace(frame(RNG, 0.0, 4, False), camera=image))
+        recorder.frame(frame(RNG, 0.02, 4, False))
+    log = read_log(tmp_path / "log.mcap", strict=True)
+    assert len(log.frames) == 2
+    kept = log.frame(0).camera
+    assert kept is not None
+    assert (kept.time, kept.valid, kept.pixels.shape) == (1.5, False, (0, 0, 3))
 
 
 def test_viewers_get_a_png_and_the_time_of_exposure(tmp_path: Path) -> None:

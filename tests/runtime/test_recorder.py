@@ -175,6 +175,20 @@ def test_a_disk_that_fills_up_during_the_run_is_reported(
         record_ticks(recorder, run)
 
 
+def test_what_goes_wrong_in_the_thread_is_told_and_blocks_nobody(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> bytes:
+        raise ValueError("a bug")
+
+    monkeypatch.setattr(recording.packed_pictures, "pack", broken)
+    # More half seconds than the queue holds.
+    run = make_run(2000)
+    recorder = Recorder(tmp_path / "log.mcap", CONFIG)
+    with pytest.raises(LogError, match="cannot write the log .*ValueError: a bug"), recorder:
+        record_ticks(recorder, run)
+
+
 def test_a_slow_disk_does_not_fill_the_memory_with_raw_pictures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
