@@ -26,7 +26,7 @@ from bluefoot_mpc.cli import (
 from bluefoot_mpc.cli.messages import keep_traceback, messages_on_stderr
 from bluefoot_mpc.cli.outcome import FAILED, INTERRUPTED, OK, Outcome, to_json
 from bluefoot_mpc.cli.parse import parse
-from bluefoot_mpc.exceptions import BlueFootError
+from bluefoot_mpc.exceptions import BlueFootError, ConfigurationError
 
 _EXECUTE: dict[type, str] = {
     arguments.ListCommand: "run:list_scenarios",
@@ -96,8 +96,14 @@ def notes(error: BaseException) -> tuple[str, ...]:
 def _execute(words: Sequence[str], prog: str) -> Outcome:
     command = parse(words, prog)
     module, _, name = _EXECUTE[type(command)].partition(":")
-    function = getattr(importlib.import_module(f"bluefoot_mpc.cli.{module}"), name)
-    return cast(Callable[[arguments.Common], Outcome], function)(command)
+    try:
+        function = getattr(importlib.import_module(f"bluefoot_mpc.cli.{module}"), name)
+        return cast(Callable[[arguments.Common], Outcome], function)(command)
+    except RuntimeError as error:
+        if "MUJOCO_GL" not in str(error):
+            raise
+        # MuJoCo looks at it when it is imported, whether pictures are wanted or not.
+        raise ConfigurationError(f"{error}. Unset MUJOCO_GL, or choose egl or osmesa") from error
 
 
 def _show(outcome: Outcome, as_json: bool) -> int:

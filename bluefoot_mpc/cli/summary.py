@@ -213,5 +213,5 @@ def _figure(value: Any) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{key} {_figure(entry)}" for key, entry in value.items())
     if isinstance(value, (list, tuple)):
-        return ", ".join(_figure(entry) for entry in value)
+        return ", ".join(_figure(entry) for entry in value) or "none"
     return writers.get(type(value), str)(value)

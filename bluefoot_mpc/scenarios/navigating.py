@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +18,8 @@ from bluefoot_mpc.types import Guide, GuideTask, Mode, MotionCommand
 
 MAX_SPEED = 0.40
 """m/s, the fastest that a trot does."""
+MAX_WAY = 1000.0
+"""m from the start, along either axis; odometry leads no robot so far."""
 MIN_APPROACH = 0.10
 """m, nearest that any part of the robot may come to anything but the floor."""
 MAX_STUCK = 10.0
@@ -119,8 +120,8 @@ class GotoConfig(GuidedConfig):
         GuidedConfig.__post_init__(self)
         if not self.waypoints:
             raise ConfigurationError("waypoints: give at least one, e.g. scenario.waypoints=[[1.0, 0.5]]")
-        if not all(math.isfinite(x) and math.isfinite(y) for x, y in self.waypoints):
-            raise ConfigurationError(f"waypoints = {self.waypoints} must be numbers")
+        if not all(abs(x) <= MAX_WAY and abs(y) <= MAX_WAY for x, y in self.waypoints):
+            raise ConfigurationError(f"waypoints = {self.waypoints} must be numbers within ±{MAX_WAY:g} m")
 
 
 class Goto(GuidedScenario):

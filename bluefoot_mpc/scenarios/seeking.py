@@ -13,6 +13,7 @@ from bluefoot_mpc.scenarios.base import NOT_MEASURED, Criterion
 from bluefoot_mpc.scenarios.navigating import GuidedConfig, GuidedScenario, safe_criteria, stuck_criterion
 from bluefoot_mpc.settings import require_range
 from bluefoot_mpc.sim.config import SimConfig
+from bluefoot_mpc.sim.leader_config import LeaderConfig
 from bluefoot_mpc.types import Guide, GuideTask
 from bluefoot_mpc.wheels.ready import READY
 
@@ -121,10 +122,21 @@ class Follow(GuidedScenario):
         return Guide(task=GuideTask.FOLLOW, speed=self.config.speed, distance=self.config.distance)
 
     def prepare(self, sim: SimConfig) -> SimConfig:
-        """Put the leader into the world."""
+        """Put the leader into the world.
+
+        Raises:
+            ConfigurationError: the simulator's own section names another leader.
+        """
         config = self.config
-        leader = replace(sim.leader, kind=config.leader, speed=config.leader_speed, path=config.leader_path)
-        return replace(sim, leader=leader)
+        chosen = {"kind": config.leader, "speed": config.leader_speed, "path": config.leader_path}
+        keys = {"kind": "leader", "speed": "leader_speed", "path": "leader_path"}
+        for key, value in chosen.items():
+            given = getattr(sim.leader, key)
+            if given not in (value, getattr(LeaderConfig(), key)):
+                raise ConfigurationError(
+                    f"sim.leader.{key} = {given!r} has no effect on 'follow': set scenario.{keys[key]} instead"
+                )
+        return replace(sim, leader=replace(sim.leader, **chosen))
 
     def figures(self, run: RunData) -> Mapping[str, Any]:
         """How long the leader was in view, at what distance, and how near it came to things."""

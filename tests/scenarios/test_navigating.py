@@ -50,6 +50,12 @@ def test_the_task_starts_after_the_standing():
         ("wander", "scenario.speed=-0.1"),
         ("goto", "scenario.waypoints=[]"),
         ("goto", "scenario.waypoints=[[nan, 1.0]]"),
+        ("goto", "scenario.waypoints=[[1e300, 1.0]]"),
+        ("follow", "scenario.leader_speed=0.5"),
+        ("follow", "scenario.leader_path='spiral'"),
+        ("follow", "sim.leader.speed=0.3"),
+        ("follow", "sim.leader.kind='mecanum'"),
+        ("approach", "scenario.distance=0.1"),
     ],
 )
 def test_impossible_values_are_refused(name, override):
