@@ -128,13 +128,13 @@ class Follow(GuidedScenario):
             ConfigurationError: the simulator's own section names another leader.
         """
         config = self.config
-        chosen = {"kind": config.leader, "speed": config.leader_speed, "path": config.leader_path}
+        chosen: dict[str, Any] = {"kind": config.leader, "speed": config.leader_speed, "path": config.leader_path}
         keys = {"kind": "leader", "speed": "leader_speed", "path": "leader_path"}
         for key, value in chosen.items():
             given = getattr(sim.leader, key)
             if given not in (value, getattr(LeaderConfig(), key)):
                 raise ConfigurationError(
-                    f"sim.leader.{key} = {given!r} has no effect on 'follow': set scenario.{keys[key]} instead"
+                    f"sim.leader.{key} = {given!r} has no effect here: set scenario.{keys[key]} instead"
                 )
         return replace(sim, leader=replace(sim.leader, **chosen))
 
