@@ -127,14 +127,14 @@ class Follow(GuidedScenario):
         Raises:
             ConfigurationError: the simulator's own section names another leader.
         """
-        config = self.config
-        chosen: dict[str, Any] = {"kind": config.leader, "speed": config.leader_speed, "path": config.leader_path}
-        keys = {"kind": "leader", "speed": "leader_speed", "path": "leader_path"}
+        config, leader = self.config, LeaderConfig()
+        names = {"kind": "leader", "speed": "leader_speed", "path": "leader_path"}
+        chosen: dict[str, Any] = {key: getattr(config, name) for key, name in names.items()}
         for key, value in chosen.items():
             given = getattr(sim.leader, key)
-            if given not in (value, getattr(LeaderConfig(), key)):
+            if given not in (value, getattr(leader, key)):
                 raise ConfigurationError(
-                    f"sim.leader.{key} = {given!r} has no effect here: set scenario.{keys[key]} instead"
+                    f"sim.leader.{key} = {given!r} has no effect here: set scenario.{names[key]} instead"
                 )
         return replace(sim, leader=replace(sim.leader, **chosen))
 
