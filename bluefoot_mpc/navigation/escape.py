@@ -57,18 +57,31 @@ class StuckWatch:
 
     def __init__(self, config: EscapeConfig) -> None:
         self._config = config
-        self._poses: deque[tuple[float, Pose]] = deque()
+        self._poses: deque[tuple[float, Pose, Motion]] = deque()
 
     def reset(self) -> None:
         """Forget everything: the robot may stay for a while from now."""
         self._poses.clear()
 
-    def rests(self, pose: Pose, time: float) -> float:
-        """How long the robot has stayed within the bounds around where it is now (s)."""
-        while self._poses and moved(self._poses[0][1], pose, self._config):
+    def rests(self, pose: Pose, time: float, wanted: Motion) -> float:
+        """How long the robot has stayed within the bounds around where it is, though it should not have (s).
+
+        Args:
+            pose: of the robot.
+            time: s.
+            wanted: motion since the last call; zero is returned until all of it adds up to twice the bounds.
+        """
+        config, asked = self._config, Motion()
+        if self._poses:
+            last, _, asked = self._poses[-1]
+            asked = Motion(*(a + (time - last) * b for a, b in zip(asked, wanted, strict=True)))
+        while self._poses and moved(self._poses[0][1], pose, config):
             self._poses.popleft()
-        self._poses.append((time, pose))
-        return time - self._poses[0][0]
+        self._poses.append((time, pose, asked))
+        since, _, before = self._poses[0]
+        x, y, turn = (a - b for a, b in zip(asked, before, strict=True))
+        far = math.hypot(x, y) > 2.0 * config.distance or abs(turn) > 2.0 * math.radians(config.turn_deg)
+        return time - since if far else 0.0
 
 
 def moved(start: Pose, now: Pose, config: EscapeConfig) -> bool:

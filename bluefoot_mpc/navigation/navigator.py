@@ -109,7 +109,7 @@ class Navigator:
     def _decide(self, guide: Guide, scan: LevelScan, time: float) -> None:
         """What to do until the next sweep."""
         lead = self._leading.step(guide, self._around, scan)
-        self._lead = lead = self._out_of_the_corner(lead, time)
+        self._lead = lead = self._out_of_the_corner(lead, guide.speed, time)
         speed = guide.speed
         if self._around.open_ground and lead.guided is not Guided.MARKER:
             # Open ground looks like this, and so does a LIDAR that is dirty, or was covered from the start.
@@ -127,10 +127,10 @@ class Navigator:
         elif self._stalled is None:
             self._stalled = time
 
-    def _out_of_the_corner(self, lead: Lead, time: float) -> Lead:
+    def _out_of_the_corner(self, lead: Lead, speed: float, time: float) -> Lead:
         """The way out in place of what leads, where the robot has been stuck."""
         pose = self._around.pose
-        rests = self._watch.rests(pose, time)
+        rests = self._watch.rests(pose, time, allowed(lead.motion, speed, self._config.limits))
         if not self._config.escape.is_motion(lead.motion):
             self._begin_afresh()
             return lead

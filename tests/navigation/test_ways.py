@@ -231,11 +231,23 @@ def test_a_waypoint_that_takes_too_long_is_given_up() -> None:
 def test_watch_notices_who_stays() -> None:
     watch = StuckWatch(EscapeConfig())
     for tick in range(60):
-        rests = watch.rests(Pose(0.001 * tick, 0.0, 0.0), 0.1 * tick)
+        rests = watch.rests(Pose(0.001 * tick, 0.0, 0.0), 0.1 * tick, Motion(0.15))
     assert 4.0 < rests < 6.0
-    assert watch.rests(Pose(0.5, 0.0, 0.0), 6.0) == 0.0
-    assert watch.rests(Pose(0.5, 0.0, 0.3), 6.1) == 0.0
-    assert watch.rests(Pose(0.5, 0.0, 0.3), 7.1) == pytest.approx(1.0)
+    assert watch.rests(Pose(0.5, 0.0, 0.0), 6.0, Motion(0.15)) == 0.0
+    assert watch.rests(Pose(0.5, 0.0, 0.3), 6.1, Motion(0.15)) == 0.0
+    assert watch.rests(Pose(0.5, 0.0, 0.3), 7.1, Motion(0.15)) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("wanted", [Motion(0.004), Motion(0.0, 0.0, 0.02)])
+def test_who_wants_little_is_not_stuck_where_little_happens(wanted: Motion) -> None:
+    watch = StuckWatch(EscapeConfig())
+    assert max(watch.rests(Pose(0.0, 0.0, 0.0), 0.1 * tick, wanted) for tick in range(100)) == 0.0
+
+
+def test_who_is_told_to_and_fro_is_not_stuck() -> None:
+    watch = StuckWatch(EscapeConfig())
+    way = [Motion(0.05 if tick // 5 % 2 else -0.05) for tick in range(100)]
+    assert max(watch.rests(Pose(0.0, 0.0, 0.0), 0.1 * k, motion) for k, motion in enumerate(way)) == 0.0
 
 
 def test_escape_makes_room_turns_backs_off_and_ends_when_away() -> None:
