@@ -131,7 +131,9 @@ class Navigator:
         """The way out in place of what leads, where the robot has been stuck."""
         pose = self._around.pose
         rests = self._watch.rests(pose, time, allowed(lead.motion, speed, self._config.limits))
-        if not self._config.escape.is_motion(lead.motion):
+        # Who is too near to a marker and cannot back off had better keep it in view.
+        backs_off = lead.guided is Guided.MARKER and lead.motion.x <= 0.0
+        if backs_off or not self._config.escape.is_motion(lead.motion):
             self._begin_afresh()
             return lead
         stuck = rests > self._config.escape.patience
