@@ -17,6 +17,8 @@ from bluefoot_mpc.types import CameraImage
 
 PLAIN = 0.88
 """Share of the outline on which an edge fits from which on no other circle in the same patch is tried."""
+NEAR = 0.25
+"""Of the expected radius: how far from where it is expected a ball may be, and how much larger or smaller."""
 LEAST_SIDE = 24
 """Pixels: smaller pictures show nothing that could be measured."""
 
@@ -149,7 +151,14 @@ class MarkerFinder:
             return None
         patch = marker_colour.cut_around(pixels, expected, self._colour)
         cone = marker_edge.measure(patch, expected, lens, limits)
-        return cone if cone is not None and cone.support > PLAIN and cone.arc > PLAIN else None
+        if cone is None or cone.arc < PLAIN:
+            return None
+        # Before a wall of its colour less of the edge fits; that it is where it should be makes up for that.
+        column, row = lens.project(cone.axis)
+        radius = lens.focal * math.tan(cone.angle)
+        off = math.hypot(column - expected[0], row - expected[1])
+        near = off < NEAR * expected[2] and abs(radius - expected[2]) < NEAR * expected[2]
+        return cone if near or cone.support > PLAIN else None
 
     def _anywhere(self, pixels: Any, lens: Lens) -> Cone | None:
         """The best ball in any patch of the colour."""
