@@ -8,6 +8,7 @@ what to do when a Jacobian has no inverse. docs/wheels.md leads to the functions
 
 from __future__ import annotations
 
+import argparse
 import functools
 import math
 import sys
@@ -43,13 +44,16 @@ cells = functools.partial(draw.cells, NAMES)
 
 
 def main() -> int:
-    path = Path(sys.argv[1] if len(sys.argv) > 1 else "runs/wheels.html")
+    parser = argparse.ArgumentParser(
+        description="Draw wheeled robots and legs on one page that opens offline."
+    )
+    parser.add_argument("path", nargs="?", type=Path, default=Path("runs/wheels.html"), help="file to write")
+    path = parser.parse_args().path
     parts = (constraints, robots, car, mecanum, driving, balancing, walking, equations)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open(
-            "w", encoding="utf-8"
-        ) as file:  # before the work, so that a wrong path is known at once
+        # Opened before the work, so that a wrong path is known at once.
+        with path.open("w", encoding="utf-8") as file:
             file.write(draw.document("Wheels and legs", LEAD, (part() for part in parts)))
     except BlueFootError as error:
         print(f"error: {error}", file=sys.stderr)
