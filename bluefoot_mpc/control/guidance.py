@@ -76,7 +76,8 @@ class Guidance:
         decision = self._navigator.step(motion.guide, frame, estimate, dt)
         velocity, yaw_rate, pitch = decision.velocity, decision.yaw_rate, decision.pitch
         if not math.isfinite(velocity.sum() + yaw_rate + pitch):
-            return motion, decision.report, ("navigation: its decision is no number, the robot stands",)
+            still = replace(motion, velocity=np.zeros(2), yaw_rate=0.0)
+            return still, decision.report, ("navigation: its decision is no number, the robot stands",)
         trunk = TrunkPose(rpy=np.array([0.0, pitch, 0.0]))
         guided = replace(motion, velocity=velocity, yaw_rate=yaw_rate, trunk=trunk)
         return guided, decision.report, self._events(decision.report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -57,9 +58,9 @@ class GuidedScenario(Scenario):
         """The LIDAR."""
         return ("lidar",)
 
+    @abstractmethod
     def guide(self) -> Guide:
         """The task."""
-        raise NotImplementedError
 
     def command(self, time: float) -> MotionCommand:
         """Stand, then do the task."""
@@ -113,8 +114,7 @@ class GotoConfig(GuidedConfig):
     """Going to waypoints."""
 
     duration: float = 60.0  # s, at most
-    waypoints: tuple[tuple[float, float], ...] = ((1.5, 0.8), (2.6, -0.8), (0.0, 0.0))  # m, forward and left
-    # of where the run starts
+    waypoints: tuple[tuple[float, float], ...] = ((1.5, 0.8), (2.6, -0.8), (0.0, 0.0))  # m from the start
 
     def __post_init__(self) -> None:
         GuidedConfig.__post_init__(self)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -126,12 +125,6 @@ def first_sight(run: RunData) -> float | None:
         if record.navigation is not None and not math.isnan(record.navigation.marker[2]):
             return record.time
     return None
-
-
-def sensor_mounts(run: RunData) -> Mapping[str, Any]:
-    """Where the sensors were in this run: the table of the model's parameters."""
-    table: Mapping[str, Any] = run.config["model"]["sensors"]
-    return table
 
 
 def _is_in_view(run: RunData, tick: int, navigation: NavigationReport) -> bool:

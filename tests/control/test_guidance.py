@@ -141,7 +141,7 @@ def test_trouble_and_arrival_are_told_once_when_they_begin(pipeline):
 def test_a_decision_that_is_no_number_is_not_walked(pipeline):
     run(pipeline, WANDER)
     pipeline._guidance._navigator.yaw_rate = math.nan
-    telemetry = run(pipeline, WANDER)
+    telemetry = run(pipeline, replace(WANDER, velocity=np.array([0.1, 0.0]), yaw_rate=0.2))
     assert telemetry.motion.yaw_rate == 0.0
     np.testing.assert_array_equal(telemetry.motion.velocity, 0.0)
     assert any("no number" in event for event in telemetry.events)
