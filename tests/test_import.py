@@ -13,6 +13,7 @@ WITHOUT_SIMULATOR = (
     "runtime",
     "control",
     "navigation",
+    "terrain",
     "wheels",
     "estimation",
     "gait",

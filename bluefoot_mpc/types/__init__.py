@@ -20,6 +20,7 @@ from bluefoot_mpc.types.telemetry import (
     PlanReport,
     Telemetry,
 )
+from bluefoot_mpc.types.terrain import CrossingPhase, CrossingReport, HeightMap
 from bluefoot_mpc.types.truth import TruthSample
 
 __all__ = [
@@ -32,12 +33,15 @@ __all__ = [
     "BoolArray",
     "CameraImage",
     "ContactSchedule",
+    "CrossingPhase",
+    "CrossingReport",
     "Fallback",
     "FloatArray",
     "GaitPhase",
     "Guide",
     "GuideTask",
     "Guided",
+    "HeightMap",
     "ImuBatch",
     "JointCommand",
     "LevelReport",

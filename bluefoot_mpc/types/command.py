@@ -55,6 +55,8 @@ class GuideTask(enum.StrEnum):
     APPROACH = "approach"
     FOLLOW = "follow"
     GOTO = "goto"
+    SWEEP = "sweep"
+    CROSS = "cross"
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -63,10 +65,12 @@ class Guide:
 
     Attributes:
         task: ``wander`` through what is free; ``approach`` a marker, looked for where it is not in view,
-            and stay there; ``follow`` a marker that moves; ``goto`` the waypoints, one after the other.
+            and stay there; ``follow`` a marker that moves; ``goto`` the waypoints, one after the other;
+            ``sweep`` the ground ahead with the LIDAR, feet planted, and map it; ``cross`` rough ground to
+            the last waypoint by sweeping, mapping, planning and stepping where the ground allows.
         speed: m/s, at most.
         distance: m, wanted horizontal distance from the camera to the marker's centre.
-        waypoints: (n, 2) m, in the odometry frame; empty but for ``goto``.
+        waypoints: (n, 2) m, in the odometry frame; empty but for ``goto`` and ``cross``.
     """
 
     task: GuideTask

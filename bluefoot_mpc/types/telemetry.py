@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from bluefoot_mpc.types.command import Mode, MotionCommand
 from bluefoot_mpc.types.common import FloatArray
 from bluefoot_mpc.types.state import BodyState, GaitPhase, PostureReference
+from bluefoot_mpc.types.terrain import CrossingReport
 
 
 class Fallback(enum.IntEnum):
@@ -146,6 +147,7 @@ class Telemetry:
         plan: what preview and whole-body stage planned; None without them.
         level: what the trunk-levelling compensator did; None without one.
         navigation: how the robot finds its way; None while it is told where to go.
+        crossing: what it knows of rough ground and decides there; None but for those tasks.
     """
 
     time: float
@@ -161,3 +163,4 @@ class Telemetry:
     plan: PlanReport | None = None
     level: LevelReport | None = None
     navigation: NavigationReport | None = None
+    crossing: CrossingReport | None = None

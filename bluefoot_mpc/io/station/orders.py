@@ -40,7 +40,7 @@ class Order(enum.StrEnum):
 
 FINAL = (Order.STOP, Order.EMERGENCY)
 """Orders after which only arming asks for anything again."""
-GUIDED = tuple(Order(task) for task in GuideTask)
+GUIDED = tuple(Order(task) for task in TASKS if task)
 """Orders for which the robot finds its own way."""
 BY_MODE = {
     Mode.STAND: Order.STAND,
