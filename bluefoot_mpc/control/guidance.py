@@ -10,6 +10,7 @@ import numpy as np
 from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.navigation.config import NavigationConfig
 from bluefoot_mpc.navigation.navigator import Navigator
+from bluefoot_mpc.terrain.ground import Ground
 from bluefoot_mpc.types import BodyState, Guided, MotionCommand, NavigationReport, SensorFrame, TrunkPose
 
 _NOTEWORTHY = {
@@ -29,6 +30,9 @@ class Guidance:
     The trunk is level but for the pitch that navigation wants: the LIDAR's plane
     must not look over things, and what is checked is what is walked.
 
+    Attributes:
+        ground: what to step on, where rough ground is crossed; else None.
+
     Args:
         config: of navigation.
         mounts: where LIDAR and camera are.
@@ -36,6 +40,7 @@ class Guidance:
 
     def __init__(self, config: NavigationConfig, mounts: SensorMounts) -> None:
         self._navigator = Navigator(config, mounts)
+        self.ground: Ground | None = None
         self._guided_at = -math.inf
         self._has_task = False
         self._told: Guided | None = None
@@ -43,6 +48,7 @@ class Guidance:
     def reset(self) -> None:
         """Forget everything."""
         self._navigator.reset()
+        self.ground = None
         self._guided_at = -math.inf
         self._has_task = False
         self._told = None
