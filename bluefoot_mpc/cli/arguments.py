@@ -128,6 +128,8 @@ class RunCommand(RobotArguments):
         str | None, tyro.conf.arg(metavar="KIND", help_behavior_hint="(default: differential)")
     ] = None
     """Follow: kind of wheeled robot that leads, e.g. ackermann, mecanum, balancing."""
+    blind: bool = False
+    """Rough: walk straight on at one step height, without looking."""
     level: Annotated[
         str | None,
         tyro.conf.arg(metavar="{none,pd,narx}", help_behavior_hint="(default: none; level: narx)"),
@@ -141,7 +143,8 @@ class RunCommand(RobotArguments):
         """Arguments by the names that RunOptions gives them."""
         names = ["duration", "view", "speed", "lateral_speed"]
         names += ["yaw_rate", "impulse", "direction", "push_time", "leader", "level", "level_mix"]
-        return {**super().run_fields(), **{name: getattr(self, name) for name in names}}
+        fields = {**super().run_fields(), **{name: getattr(self, name) for name in names}}
+        return {**fields, "blind": self.blind or None}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,7 @@ from bluefoot_mpc.sim.config import SimConfig
 SCENARIO_OPTIONS = {
     "duration": "duration", "gait": "gait", "speed": "speed", "lateral_speed": "lateral_speed",
     "yaw_rate": "yaw_rate", "impulse": "impulse", "direction": "direction", "push_time": "push_time",
-    "leader": "leader",
+    "leader": "leader", "blind": "blind",
 }  # fmt: skip
 """Options that fill a field of the scenario's configuration, where it has that field."""
 

@@ -58,6 +58,7 @@ class RunOptions:
     direction: float | None = None  # degrees from forward, left positive
     push_time: float | None = None  # s
     leader: str | None = None  # kind of a wheeled robot, see bluefoot_mpc.wheels.ready
+    blind: bool | None = None  # cross rough ground without looking
     level: str | None = None  # trunk levelling, one of LEVELS
     level_mix: float | None = None  # share of the levelling goals, between 0 and 1
 
