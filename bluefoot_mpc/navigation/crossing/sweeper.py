@@ -1,0 +1,243 @@
+"""Sweeping the ground ahead: the trunk pitches through levels, feet planted, and the LIDAR looks at each."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bluefoot_mpc.model.parameters import SensorMounts
+from bluefoot_mpc.navigation.crossing.pose_track import PoseTrack
+from bluefoot_mpc.terrain.cloud import CloudConfig, scan_points
+from bluefoot_mpc.terrain.sweep import SweepConfig, advance, levels
+from bluefoot_mpc.types import BodyState, FloatArray, LidarScan, SensorFrame, TrunkPose
+
+AHEAD = 0.05
+"""s that a scan's time stamp may lie ahead of the frame's."""
+OLD = 0.3
+"""s; an older scan is of a pose that is no longer known."""
+OUT_OF_REACH = 3
+"""Levels in a row that were not reached, after which the rest is taken to be out of reach."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SweepStep:
+    """What a sweep wants and gives on one tick.
+
+    Attributes:
+        pitch: rad, wanted pitch of the trunk, nose down positive.
+        points: (k, 3) m, what this tick's scan met, odometry frame; empty where none counts.
+        level: index of the level that is being looked at; -1 on the way to the first, and back.
+        done: True when the sweep has ended and the trunk is level again.
+        reason: what went wrong, in few words; empty where nothing did.
+        position: (3,) m, wanted shift of the trunk over its feet.
+        reached: levels that were reached so far.
+        count: levels in all.
+    """
+
+    pitch: float
+    points: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    level: int = -1
+    done: bool = False
+    reason: str = ""
+    position: FloatArray = field(default_factory=lambda: np.zeros(3))
+    reached: int = 0
+    count: int = 0
+
+    @property
+    def trunk(self) -> TrunkPose:
+        """The wanted offset of the trunk."""
+        return TrunkPose(position=self.position, rpy=np.array([0.0, self.pitch, 0.0]))
+
+
+class _Stage(enum.Enum):
+    IDLE = enum.auto()
+    APPROACH = enum.auto()
+    LEVELS = enum.auto()
+    RETURN = enum.auto()
+
+
+class Sweeper:
+    """Carries one sweep out after the other.
+
+    It never waits for ever: a level, the way to the first one and the way back have their time, scans that
+    do not come end the sweep, and so does an estimate that is not to be trusted.
+
+    Args:
+        config: range, levels and pace.
+        mounts: where the LIDAR is.
+        cloud: which points of a scan count.
+    """
+
+    def __init__(self, config: SweepConfig, mounts: SensorMounts, cloud: CloudConfig | None = None) -> None:
+        self._config, self._mounts, self._cloud = config, mounts, cloud or CloudConfig()
+        self._tolerance = math.radians(config.tolerance_deg)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the state after ``__init__``, bit for bit."""
+        self._track = PoseTrack()
+        self._levels: FloatArray = np.zeros(0)
+        self._heard, self._scan_time, self._fault = -math.inf, -math.inf, ""
+        self._enter(_Stage.IDLE, -math.inf)
+        self._wanted, self._level, self._scans = 0.0, 0, 0
+        self._reached, self._missed_in_a_row, self._reason = 0, 0, ""
+
+    def begin(self, time: float) -> None:
+        """Start a sweep.
+
+        Args:
+            time: s, of the frame.
+        """
+        self.reset()
+        self._heard = time
+        self._enter(_Stage.APPROACH, time)
+
+    def step(self, frame: SensorFrame, estimate: BodyState, dt: float) -> SweepStep:
+        """One tick.
+
+        Args:
+            frame: the newest sensor frame.
+            estimate: where the robot believes to be.
+            dt: s.
+        """
+        if self._stage is _Stage.IDLE:
+            return SweepStep(pitch=0.0, done=True, reason=self._reason or "no sweep was begun")
+        time = frame.time
+        trusted = estimate.healthy and bool(
+            np.isfinite(estimate.position).all() and np.isfinite(estimate.rpy).all()
+        )
+        if trusted:
+            self._track.add(estimate)
+        scan = self._usable(frame.lidar, time)
+        if self._stage is not _Stage.RETURN:
+            self._watch(time, trusted)
+        points = np.zeros((0, 3))
+        if self._stage is _Stage.APPROACH:
+            self._approach(estimate, time, dt)
+        elif self._stage is _Stage.LEVELS:
+            points = self._look(scan, estimate, time, dt)
+        if self._stage is _Stage.RETURN:
+            self._go_back(estimate, trusted, time, dt)
+        return self._step(points)
+
+    def _step(self, points: FloatArray) -> SweepStep:
+        config, done = self._config, self._stage is _Stage.IDLE
+        shifted = self._stage in (_Stage.APPROACH, _Stage.LEVELS)
+        return SweepStep(
+            pitch=self._wanted, points=points, done=done, reason=self._reason,
+            level=self._level if self._stage is _Stage.LEVELS else -1,
+            position=np.array((config.forward, 0.0, config.raised)) if shifted else np.zeros(3),
+            reached=self._reached, count=len(self._levels),
+        )  # fmt: skip
+
+    def _enter(self, stage: _Stage, time: float) -> None:
+        self._stage, self._since = stage, time
+
+    def _watch(self, time: float, trusted: bool) -> None:
+        """End the sweep where there is nothing to go by."""
+        if not trusted:
+            self._end(time, "the estimate of the robot's pose is not to be trusted")
+        elif time - self._heard > self._config.scan_timeout:
+            self._end(time, f"no usable scan: {self._fault or 'none came'}")
+
+    def _end(self, time: float, reason: str = "") -> None:
+        self._reason = "; ".join(part for part in (self._reason, reason) if part)
+        self._enter(_Stage.RETURN, time)
+
+    def _usable(self, scan: LidarScan | None, time: float) -> LidarScan | None:
+        """The scan, where it is of use; else why not is kept."""
+        if scan is None:
+            return None
+        self._fault = _unusable(scan, time, self._scan_time)
+        if self._fault:
+            return None
+        self._scan_time, self._heard = scan.time, time
+        return scan
+
+    def _approach(self, estimate: BodyState, time: float, dt: float) -> None:
+        """To the first level."""
+        config = self._config
+        if not len(self._levels):
+            self._levels = levels(config, estimate.height + config.raised, self._mounts.lidar[2])
+            self._wanted = min(max(float(estimate.rpy[1]), 0.0), config.pitch_range[1])
+        first, pitch = float(self._levels[0]), float(estimate.rpy[1])
+        self._wanted += min(max(first - self._wanted, -config.max_rate * dt), config.max_rate * dt)
+        if abs(first - pitch) <= self._tolerance or time - self._since > config.approach_time:
+            self._enter(_Stage.LEVELS, time)
+
+    def _look(self, scan: LidarScan | None, estimate: BodyState, time: float, dt: float) -> FloatArray:
+        """At the present level; then on to the next."""
+        config, points = self._config, np.zeros((0, 3))
+        level = float(self._levels[self._level])
+        if scan is not None:
+            pose = self._track.at(scan.time)
+            counts = abs(pose.pitch - level) <= self._allowed() and pose.rate <= config.quiet_rate
+            self._scans += counts
+            if counts or config.use_all_scans:
+                points = scan_points(scan, pose.position, pose.quaternion, self._mounts, self._cloud)
+        self._wanted = advance(self._wanted, level, float(estimate.rpy[1]), dt, config)
+        if self._scans >= config.dwell_scans:
+            self._reached, self._missed_in_a_row = self._reached + 1, 0
+            self._next(time)
+        elif time - self._since > config.level_timeout:
+            self._missed_in_a_row += 1
+            self._next(time)
+        return points
+
+    def _allowed(self) -> float:
+        """How far (rad) a scan may be off the level: nearer to it than to its neighbours is enough."""
+        gaps = np.diff(self._levels[max(self._level - 1, 0) : self._level + 2])
+        return max(self._tolerance, 0.5 * float(gaps.min()))
+
+    def _next(self, time: float) -> None:
+        """On to the next level, or back."""
+        count, before = len(self._levels), float(self._levels[self._level])
+        self._level, self._scans = self._level + 1, 0
+        given_up = self._missed_in_a_row >= OUT_OF_REACH
+        if self._level < count and not given_up:
+            # The law corrects what is left: without the step ahead each level would wait for it.
+            self._wanted += float(self._levels[self._level]) - before
+            self._enter(_Stage.LEVELS, time)
+            return
+        first = self._level - self._missed_in_a_row
+        missed = count - self._reached
+        if given_up and missed:
+            pitch = math.degrees(self._levels[first])
+            self._end(
+                time, f"{missed} of {count} levels not reached, from {pitch:.1f} degrees on out of reach"
+            )
+        else:
+            self._end(time, f"{missed} of {count} levels not reached in time" if missed else "")
+
+    def _go_back(self, estimate: BodyState, trusted: bool, time: float, dt: float) -> None:
+        """Until the trunk is level."""
+        config = self._config
+        self._wanted = max(self._wanted - config.max_rate * dt, 0.0)
+        late = time - self._since > config.return_time
+        level = trusted and abs(float(estimate.rpy[1])) <= math.radians(config.level_deg)
+        if self._wanted == 0.0 and (level or late):
+            if late and not level:
+                self._reason = "; ".join(part for part in (self._reason, "the trunk is not level") if part)
+            self._enter(_Stage.IDLE, time)
+
+
+def _unusable(scan: LidarScan, time: float, before: float) -> str:
+    """Why a scan is of no use; empty where it is."""
+    if not scan.valid:
+        return "scan marked as invalid"
+    if not time - OLD <= scan.time <= time + AHEAD:
+        return "its time stamp is not of now"
+    if scan.time <= before:
+        return "its time stamp is not newer than the last one's"
+    return _unusable_rays(scan.bearing, scan.distance)
+
+
+def _unusable_rays(bearing: FloatArray, distance: FloatArray) -> str:
+    if bearing.shape != distance.shape or bearing.ndim != 1:
+        return "bearings and distances do not match"
+    if not np.isfinite(bearing).all():
+        return "bearings are not numbers"
+    return "" if np.isfinite(distance).any() else "no echo in the whole scan"
