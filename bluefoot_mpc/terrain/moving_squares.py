@@ -11,15 +11,18 @@ from scipy.spatial import cKDTree
 from bluefoot_mpc.settings import require_positive, require_range
 from bluefoot_mpc.types import FloatArray
 
+UP = (0.0, 0.0, 1.0)
+"""The direction against which ground is called flat."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class FitConfig:
     """How the surroundings of a point are fitted. Defaults by measurement: docs/terrain-surface.md."""
 
-    neighbours: int = 32  # at most so many, the nearest ones
-    radius: float = 0.06  # m, none beyond
-    width: float = 0.03  # m, standard deviation of the Gaussian weight over distance
-    step: float = 0.01  # m, standard deviation of the weight over the distance from the plane: keeps edges
+    neighbours: int = 40  # at most so many, the nearest ones
+    radius: float = 0.10  # m, none beyond
+    width: float = 0.05  # m, standard deviation of the Gaussian weight over distance
+    step: float = 0.006  # m, standard deviation of the weight over the distance from the plane: keeps edges
     rounds: int = 2  # fits of the smoothing
 
     def __post_init__(self) -> None:
@@ -47,7 +50,7 @@ class Planes:
     """Weighted planes through the surroundings of n points.
 
     Attributes:
-        centre: (n, 3) m, a point of each plane.
+        centre: (n, 3) m, a point of each plane, from the point whose surroundings they are.
         normal: (n, 3) unit normals, z not negative.
         spread: (n, 3) m^2, variances along the principal axes, the normal's first.
     """
@@ -77,39 +80,45 @@ def find_neighbours(points: FloatArray, count: FloatArray, config: FitConfig) ->
     return Neighbours(index=index, weight=weight)
 
 
-def fit_planes(points: FloatArray, around: Neighbours, weight: FloatArray) -> Planes:
+def offsets(points: FloatArray, around: Neighbours) -> FloatArray:
+    """(3, n, k) m, from each point to its neighbours, one array a coordinate: sums over those are fastest."""
+    return np.stack([axis.take(around.index) - axis[:, None] for axis in np.ascontiguousarray(points.T)])
+
+
+def fit_planes(offset: FloatArray, weight: FloatArray) -> Planes:
     """The plane of least squares through the surroundings of every point: principal axes, smallest first.
 
     Args:
-        points: (n, 3) m.
-        around: their neighbours.
+        offset: (3, n, k) m, from the points to their neighbours.
         weight: (n, k) of the neighbours; a row of zeros gives a level plane through the point.
     """
-    near = points[around.index] - points[:, None]
     total = weight.sum(axis=1)
     share = weight / np.where(total > 0.0, total, 1.0)[:, None]
-    centre = np.einsum("nk,nkd->nd", share, near)
-    near -= centre[:, None]
-    spread, axes = np.linalg.eigh(np.matmul((near * share[:, :, None]).transpose(0, 2, 1), near))
+    weighted = offset * share
+    centre = weighted.sum(axis=2)
+    moment = np.empty((offset.shape[1], 3, 3))
+    for a, b in ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)):  # eigh reads the lower triangle
+        moment[:, a, b] = np.einsum("nk,nk->n", weighted[a], offset[b]) - centre[a] * centre[b]
+    spread, axes = np.linalg.eigh(moment)
     normal = axes[:, :, 0]
     normal = np.where(normal[:, 2:] < 0.0, -normal, normal)
-    normal[total <= 0.0] = (0.0, 0.0, 1.0)
-    return Planes(centre=centre + points, normal=normal, spread=np.maximum(spread, 0.0))
+    normal[total <= 0.0] = UP
+    return Planes(centre=centre.T, normal=normal, spread=np.maximum(spread, 0.0))
 
 
-def same_face(points: FloatArray, around: Neighbours, normal: FloatArray, config: FitConfig) -> FloatArray:
+def same_face(offset: FloatArray, weight: FloatArray, normal: FloatArray, step: float) -> FloatArray:
     """(n, k) weights that fade with the distance from the plane through the point itself.
 
     What lies a step above or below belongs to another face, and would tilt the fit.
 
     Args:
-        points: (n, 3) m.
-        around: their neighbours.
+        offset: (3, n, k) m, from the points to their neighbours.
+        weight: (n, k) of the neighbours, by distance.
         normal: (n, 3) unit normals of the planes.
-        config: height of a step that counts as one.
+        step: m, standard deviation of the weight over the distance from the plane.
     """
-    away = np.einsum("nkd,nd->nk", points[around.index] - points[:, None], normal)
-    return np.asarray(around.weight * np.exp(-0.5 * np.square(away / config.step)))
+    away = (offset * normal.T[:, :, None]).sum(axis=0)
+    return np.asarray(weight * np.exp(-0.5 * np.square(away / step)))
 
 
 def smooth(points: FloatArray, around: Neighbours, config: FitConfig) -> FloatArray:
@@ -123,12 +132,13 @@ def smooth(points: FloatArray, around: Neighbours, config: FitConfig) -> FloatAr
         around: their neighbours.
         config: of the fit.
     """
+    points = np.array(points)
+    normal = np.tile(UP, (len(points), 1))
     if not len(points):
-        return np.zeros((0, 3))
-    normal = np.broadcast_to((0.0, 0.0, 1.0), points.shape)
+        return points
     for _ in range(config.rounds):
-        planes = fit_planes(points, around, same_face(points, around, normal, config))
+        offset = offsets(points, around)
+        planes = fit_planes(offset, same_face(offset, around.weight, normal, config.step))
         normal = planes.normal
-        off = np.einsum("nd,nd->n", planes.centre - points, normal)
-        points = points + off[:, None] * normal
+        points += np.einsum("nd,nd->n", planes.centre, normal)[:, None] * normal
     return points

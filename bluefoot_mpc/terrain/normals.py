@@ -6,11 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bluefoot_mpc.terrain.moving_squares import FitConfig, Neighbours, fit_planes, same_face
+from bluefoot_mpc.terrain.moving_squares import UP, FitConfig, Neighbours, fit_planes, offsets, same_face
 from bluefoot_mpc.types import BoolArray, FloatArray
-
-UP = (0.0, 0.0, 1.0)
-"""The direction against which ground is called flat."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -38,8 +35,9 @@ def normals(points: FloatArray, around: Neighbours, config: FitConfig) -> Normal
     """
     if not len(points):
         return Normals(normal=np.zeros((0, 3)), roughness=np.zeros(0), curvature=np.zeros(0))
-    level = np.broadcast_to(UP, points.shape)
-    planes = fit_planes(points, around, same_face(points, around, level, config))
+    offset = offsets(points, around)
+    level = np.tile(UP, (len(points), 1))
+    planes = fit_planes(offset, same_face(offset, around.weight, level, config.step))
     total = planes.spread.sum(axis=1)
     return Normals(
         normal=planes.normal,

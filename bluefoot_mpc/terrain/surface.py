@@ -17,7 +17,7 @@ from bluefoot_mpc.types import BoolArray, FloatArray
 class SurfaceConfig:
     """How a surface is reconstructed."""
 
-    voxel: float = 0.01  # m, side of a voxel
+    voxel: float = 0.02  # m, side of a voxel
     fit: FitConfig = field(default_factory=FitConfig)
     least_neighbours: int = 6  # a point with fewer around it is not surface
     flatness: float = 0.06  # e_max: 1 - cos of the angle to the vertical that is flat; 0.06 is 20 degrees
