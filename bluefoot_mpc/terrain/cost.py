@@ -2,8 +2,8 @@
 
 Thesis, chapter 6, terrain: variance of the heights under the four feet, sum of the squared gradients there,
 and squared yaw. The feet are those of the stance, turned by the yaw and put on the nearest cells (the thesis
-rounds up, which shifts all feet by half a cell). The heights under the feet of one yaw are shifted views of one
-map, so that nothing loops over cells.
+rounds up, which shifts all feet by half a cell). The heights under the feet of one yaw are shifted views of
+one map, so that nothing loops over cells.
 """
 
 from __future__ import annotations

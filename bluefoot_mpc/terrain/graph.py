@@ -3,9 +3,9 @@
 The same graph, moves, start and goal as the windows of `terrain.windows`, so that its way never costs more.
 
 The heuristic is the cheapest way to the goal when one of the two coordinates may be chosen freely in each
-column: once the yaw, once the place sideways; the larger of the two counts. It drops a constraint, so it never
-overestimates, and it is consistent, h(a) <= c(b) + h(b) for every step from a to b. Dijkstra's search on the
-reduced costs c(b) + h(b) - h(a), bounded by what is known to suffice (the best of some greedy ways), is A*.
+column: once the yaw, once the place sideways; the larger of the two counts. It drops a constraint, so it
+never overestimates, and it is consistent, h(a) <= c(b) + h(b) for every step from a to b. Dijkstra's search on
+the reduced costs c(b) + h(b) - h(a), bounded by what is known to suffice (the best of some greedy ways), is A*.
 Cells whose cheapest way forth and back, by the same two bounds, already costs more never enter the graph.
 """
 
@@ -51,9 +51,8 @@ def optimal(cost: FloatArray, start: Start, goal: Goal | None = None) -> Path:
     to_go = _bounds(layers[::-1], ends)[::-1]
     if not np.isfinite(to_go[0, start[0], start[2]]):
         return short_path(cells, _NO_WAY)
-    greedy = min(
-        (search(cost, start, goal, window) for window in _BOUNDING_WINDOWS), key=lambda way: way.cost
-    )
+    ways = [search(cost, start, goal, window) for window in _BOUNDING_WINDOWS]
+    greedy = min(ways, key=lambda way: way.cost)
     begin = np.full(layers.shape[1:], np.inf)
     begin[start[0], start[2]] = 0.0
     come = _bounds(layers, begin)
@@ -126,7 +125,7 @@ def _a_star(layers: FloatArray, to_go: FloatArray, keep: BoolArray, most: float)
 def _steps(
     layers: FloatArray, to_go: FloatArray, keep: BoolArray, nodes: NDArray[np.intp]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], FloatArray]:
-    """Row starts, columns and reduced costs of the graph: the nine steps from each kept cell to kept cells."""
+    """Row starts, columns and reduced costs of the graph: the nine steps from each kept cell."""
     number = np.full((keep.shape[0] + 1, keep.shape[1] + 2, keep.shape[2] + 2), -1, dtype=np.int32)
     number[:-1, 1:-1, 1:-1][keep] = np.arange(nodes.size, dtype=np.int32)
     layer, i, u = np.unravel_index(nodes, keep.shape)

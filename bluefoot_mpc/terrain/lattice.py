@@ -1,8 +1,8 @@
 """Ways over the cells of a cost tensor: what a planner is asked, and what it answers.
 
 All planners move on one graph (thesis, chapter 6, terrain; system of moves as corrected): from cell (i, j, u)
-to (i + {-1, 0, 1}, j + 1, u + {-1, 0, 1}). So j grows by one with every step, and all ways to a column have as
-many steps. The yaw index is bounded, it does not wrap: its ends are both "backwards", where no way turns.
+to (i + {-1, 0, 1}, j + 1, u + {-1, 0, 1}). So j grows by one with every step, and all ways to a column have
+as many steps. The yaw index is bounded, it does not wrap: its ends are both "backwards", where no way turns.
 A way costs the sum of the tensor over all of its cells, the first one included.
 """
 

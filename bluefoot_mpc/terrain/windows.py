@@ -20,6 +20,7 @@ from bluefoot_mpc.types import FloatArray
 WINDOWS = (1, 5, 15, 30)
 """Cells, the windows that the thesis compares."""
 
+_SIGNS = tuple((di, du) for di in (-1, 0, 1) for du in (-1, 0, 1))
 _Sides = tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]
 
 
@@ -70,12 +71,11 @@ def _step(cost: FloatArray, cell: Start, goal: Goal, reach: tuple[int, int]) -> 
     view = cost[low_i:high_i, j + 1 : ahead + 1, low_u:high_u].copy()
     at_i, at_j, at_u = np.arange(low_i, high_i), np.arange(j + 1, ahead + 1), np.arange(low_u, high_u)
     _strike_outside(view, (at_i, at_j, at_u), goal)
-    for di in (-1, 0, 1):
-        for du in (-1, 0, 1):
-            if not (0 <= i + di < n and 0 <= u + du < turns and np.isfinite(cost[i + di, j + 1, u + du])):
-                view[
-                    np.ix_(np.sign(at_i - i) == di, np.ones(at_j.size, dtype=bool), np.sign(at_u - u) == du)
-                ] = np.inf
+    side_i, side_u = np.sign(at_i - i), np.sign(at_u - u)
+    for di, du in _SIGNS:
+        if not (0 <= i + di < n and 0 <= u + du < turns and np.isfinite(cost[i + di, j + 1, u + du])):
+            behind = (side_i == di)[:, None, None] & (side_u == du)[None, None, :]
+            np.copyto(view, np.inf, where=behind)
     best = view.min(initial=np.inf)
     if not np.isfinite(best):
         return None
