@@ -132,7 +132,7 @@ class LookAhead:
         return self._numbers
 
     def _commanded(self, state: GaitState) -> Parameters:
-        return self._engine.parameters.at(state.place, state.wanted, state.wanted_yaw_rate)
+        return self._engine.reader(state).at(state.place, state.wanted, state.wanted_yaw_rate)
 
     def _steady(self, state: GaitState, phase: FloatArray, now: Parameters) -> _Course:
         cycle, share = now.cycle_time, state.rhythm.share
@@ -155,7 +155,7 @@ class LookAhead:
         velocity, yaw_rate = _ramp(knots, state, left)
         params = [state.now]
         for v, w in zip(velocity[1:].tolist(), yaw_rate[1:].tolist(), strict=True):
-            params.append(self._engine.parameters.at(state.place, v, w))
+            params.append(self._engine.reader(state).at(state.place, v, w))
         rhythm, place = self._engine.transition.rhythm, state.place
         shares = [rhythm(place, now.shares).share for now in params]
         cycles = [now.cycle_time for now in params]

@@ -26,14 +26,22 @@ def _walk_timing() -> GaitTiming:
     )
 
 
+def _rough_timing() -> GaitTiming:
+    return GaitTiming(
+        swing_share=0.2, a_v=300.0, a_omega=60.0, cycle_min=2.4, cycle_max=2.4, height_min=0.02, height_max=0.03
+    )
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class GaitConfig:
     """Everything that shapes the gait."""
 
     trot: GaitTiming = field(default_factory=GaitTiming)  # diagonal pairs
     walk: GaitTiming = field(default_factory=_walk_timing)  # one leg after the other
+    rough: GaitTiming = field(default_factory=_rough_timing)  # the walk over rough ground
     trot_table: GaitTable = field(default_factory=GaitTable)  # over speed, instead of the laws
     walk_table: GaitTable = field(default_factory=GaitTable)
+    rough_table: GaitTable = field(default_factory=GaitTable)
     cpg: CpgConfig = field(default_factory=CpgConfig)
     reflex: ReflexConfig = field(default_factory=ReflexConfig)
     foothold: FootholdConfig = field(default_factory=FootholdConfig)

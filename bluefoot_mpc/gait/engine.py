@@ -8,7 +8,7 @@ from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.cpg import CpgInputs, CpgIntegrator
 from bluefoot_mpc.gait.footholds import Foot, LegClock, Stride, advance_foot
 from bluefoot_mpc.gait.network import coming_to_rest, gated
-from bluefoot_mpc.gait.parameters import Basis, Style, parameter_reader
+from bluefoot_mpc.gait.parameters import Basis, ParameterReader, Style, parameter_reader
 from bluefoot_mpc.gait.state import GaitState
 from bluefoot_mpc.gait.transition import Transition
 from bluefoot_mpc.gait.virtual_robot import VirtualPose
@@ -30,7 +30,14 @@ class GaitEngine:
         self.parameters = parameter_reader(
             (config.trot_table, config.walk_table), (config.trot, config.walk), basis
         )
+        self._rough = parameter_reader(
+            (config.trot_table, config.rough_table), (config.trot, config.rough), basis
+        )
         self._integrator = CpgIntegrator(config.cpg)
+
+    def reader(self, state: GaitState) -> ParameterReader:
+        """Parameters over the speed, on the ground that there is."""
+        return self._rough if state.rough else self.parameters
 
     def rest(self) -> GaitState:
         """State of a robot that stands at the origin, ready to trot."""
@@ -97,7 +104,7 @@ class GaitEngine:
         if not state.walking and moving:
             state.walking = True
             state.place = state.target
-            state.now = self.parameters.at(state.place, state.velocity, state.yaw_rate)
+            state.now = self.reader(state).at(state.place, state.velocity, state.yaw_rate)
             cycle = self.transition.cycle(state.place, state.now.shares)
             state.cpg, state.rhythm = cycle.start, cycle.rhythm
         return state.walking
@@ -123,7 +130,7 @@ class GaitEngine:
         if read == state.read:
             return
         before, state.read = state.now, read
-        state.now = now = self.parameters.at(*read)
+        state.now = now = self.reader(state).at(*read)
         if now is before and not state.landing:
             return
         if not state.landing:

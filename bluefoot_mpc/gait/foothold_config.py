@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from bluefoot_mpc.gait.stepping import SteppingConfig
 from bluefoot_mpc.gait.table import Law, Vertical
 from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
 
@@ -31,6 +32,7 @@ class FootholdConfig:
     shift_limit: float = 0.06  # largest shift of landing places on demand (capture point), m
     shift_rate: float = 1.0  # fastest change of it: feet in the air follow it, m/s
     reach: float = 0.10  # farthest that a given foothold may lie from the nominal one at landing, m
+    stepping: SteppingConfig = field(default_factory=SteppingConfig)  # over rough ground
 
     def __post_init__(self) -> None:
         """Check ranges."""

@@ -12,6 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from bluefoot_mpc.gait import stepping
 from bluefoot_mpc.gait.foothold_config import FootholdConfig, SwingShape
 from bluefoot_mpc.gait.swing import lift_profile, matched_step, smooth_step, spring_transition
 from bluefoot_mpc.gait.virtual_robot import VirtualPose, carried, point_velocity
@@ -47,6 +48,7 @@ class Foot:
         offset_z: the same in height, m.
         goal: foothold given from outside, world, m; None for the virtual one.
         goal_z: its height, m.
+        top: highest point of a step over rough ground, m; None for a usual swing.
         later: foothold and height to take up at the next lift-off.
         turning: True while the leg's oscillator swings.
         swinging: True while the foot swings (False after an early landing).
@@ -66,6 +68,7 @@ class Foot:
     offset_z: float = 0.0
     goal: complex | None = None
     goal_z: float = 0.0
+    top: float | None = None
     later: tuple[complex, float] | None = None
     turning: bool = False
     swinging: bool = False
@@ -146,16 +149,20 @@ def advance_foot(foot: Foot, clock: LegClock, stride: Stride, config: FootholdCo
     foot.turning = clock.swing
     if not foot.swinging:
         return
-    if foot.shape.law == "virtual_force":
+    if foot.top is not None and foot.goal is not None:
+        _step_over(foot, foot.goal, clock, stride, config.stepping)
+    elif foot.shape.law == "virtual_force":
         _pull(foot, stride, config)
         if not clock.swing:
             foot.anchor = stride.after.to_world(foot.local)
     else:
         _follow(foot, clock, stride)
-    if clock.swing:
+    if not clock.swing:
+        _land(foot)
+    elif foot.top is None:
         foot.z = _height(foot, clock, stride)
     else:
-        _land(foot)
+        foot.z = stepping.height(clock.progress, foot.start_z, foot.top, foot.goal_z, config.stepping)
 
 
 def early_contact(
@@ -193,7 +200,7 @@ def freeze(
     foot.anchor = stride.after.to_world(foot.local)
     foot.velocity = 0j
     foot.swinging = False
-    foot.goal = None
+    foot.goal = foot.top = None
     if estimate is None:
         return
     shift = estimate[0] - virtual_foothold(foot, stride) + foot.offset
@@ -223,9 +230,21 @@ def _lift(foot: Foot, clock: LegClock, stride: Stride) -> None:
 def _land(foot: Foot) -> None:
     """End a swing: the foot stands where it is."""
     foot.z = foot.goal_z if foot.goal is not None else foot.offset_z
-    foot.goal = None
+    foot.goal = foot.top = None
     foot.velocity = 0j
     foot.swinging = False
+
+
+def _step_over(
+    foot: Foot, goal: complex, clock: LegClock, stride: Stride, config: stepping.SteppingConfig
+) -> None:
+    """From its place to its foothold, both fixed in the world."""
+    share = stepping.across(clock.progress, config) if clock.swing else 1.0
+    local = stride.after.to_local(foot.anchor + (goal - foot.anchor) * share)
+    foot.velocity = (local - foot.local) / stride.dt
+    foot.local = local
+    if not clock.swing:
+        foot.anchor = goal
 
 
 def _goal(foot: Foot, pose: VirtualPose, stride: Stride) -> complex:

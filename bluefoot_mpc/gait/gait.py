@@ -139,6 +139,43 @@ class Gait:
                 foot.goal, foot.goal_z = goal, place[2]
         return taken
 
+    def plan_step(self, leg: int, place: complex, height: float, top: float) -> bool:
+        """Tell a standing foot where its next swing goes, over rough ground.
+
+        Args:
+            leg: index.
+            place: x + iy, m in the world of the virtual pose.
+            height: m, there.
+            top: m, highest point of the swing.
+
+        Returns:
+            False where the foot is in the air, or a number is not finite.
+        """
+        foot = self.state.feet[leg]
+        numbers = (place.real, place.imag, height, top)
+        if foot.swinging or foot.turning or not all(map(math.isfinite, numbers)):
+            return False
+        foot.goal, foot.goal_z, foot.top = place, height, max(top, height, foot.z)
+        return True
+
+    def forget_steps(self) -> None:
+        """Take back what standing feet were told."""
+        for foot in self.state.feet:
+            if not foot.swinging:
+                foot.goal = foot.top = None
+
+    def touch_down(self, leg: int) -> None:
+        """End a swing here and now: the foot has met the ground."""
+        foot = self.state.feet[leg]
+        foot.anchor = self.state.pose.to_world(foot.local)
+        foot.goal = foot.top = None
+        foot.velocity = 0j
+        foot.swinging = False
+
+    def set_height(self, leg: int, height: float) -> None:
+        """Correct the height of a standing foot, m over the plane of b'."""
+        self.state.feet[leg].z = height
+
     def _within_reach(self, foot: Foot, landing: VirtualPose, wanted: complex) -> tuple[complex, bool]:
         """A foothold in the world, drawn in to the foot's reach at `landing`, and whether it was in it."""
         reach = self.config.foothold.reach
@@ -149,6 +186,8 @@ class Gait:
 
     def _accept(self, state: GaitState, inputs: GaitInputs) -> None:
         state.target = place_of(inputs.gait)
+        if inputs.rough != state.rough:
+            state.rough, state.read = inputs.rough, None
         if inputs.halt:
             state.wanted = state.velocity = 0j
             state.wanted_yaw_rate = state.yaw_rate = 0.0

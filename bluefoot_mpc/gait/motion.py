@@ -140,7 +140,7 @@ def _lifted(foot: Foot, lift: VirtualPose, pace: _Pace, state: GaitState) -> Foo
     fresh.start = fresh.local = lift.to_local(foot.anchor)
     fresh.velocity = -point_velocity(fresh.start, pace.velocity, pace.yaw_rate)
     fresh.swinging = True
-    if foot.later is not None:
+    if foot.top is None and foot.later is not None:
         fresh.goal, fresh.goal_z = foot.later
     return fresh
 

@@ -32,6 +32,7 @@ class GaitInputs:
         halt: True ends the gait at once: feet in the air land, then all rest.
         foothold_shift: (2,) m in b', shift of the places where feet in the air
             land (capture point); bounded, and followed at a limited speed.
+        rough: True on ground whose steps are planned one by one (`Gait.plan_step`).
     """
 
     velocity: FloatArray = field(default_factory=lambda: np.zeros(2))
@@ -43,6 +44,7 @@ class GaitInputs:
     tilt_rate_error: FloatArray = field(default_factory=lambda: np.zeros(2))
     halt: bool = False
     foothold_shift: FloatArray | None = None
+    rough: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -103,6 +105,7 @@ class GaitState:
         style: trunk parameters, following those of `now`.
         wanted_shift: wanted shift of landing places, m in b'.
         landing_shift: the shift in force.
+        rough: True on ground whose steps are planned one by one.
     """
 
     cpg: CpgState
@@ -125,6 +128,7 @@ class GaitState:
     read: tuple[float, complex, float] | None = None
     wanted_shift: complex = 0j
     landing_shift: complex = 0j
+    rough: bool = False
 
     def copy(self) -> GaitState:
         """An independent copy."""
