@@ -68,7 +68,7 @@ class Place:
         world.data.qpos[world.q + 7 : world.q + 23] = robot.stance_joints
         self.height = float(robot.default_stance()[2])
         body = (world.model, world.data, world.trunk)
-        self.lidar = RaycastLidar(*body, mounts.lidar, seed=seed)
+        self.lidar = RaycastLidar(*body, mounts, seed=seed)
         self.camera = RenderedCamera(*body, mounts.camera, mounts.camera_view_deg, config.camera, seed)
         self.finder = MarkerFinder(MarkerConfig(), mounts.camera_view_deg)
         self._rays = np.column_stack([np.cos(bearings()), np.sin(bearings()), np.zeros(POINTS)]).ravel()

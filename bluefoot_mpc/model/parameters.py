@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.geometry import rotation_from_rpy
 from bluefoot_mpc.model.resources import model_file
 from bluefoot_mpc.settings import (
     build,
@@ -176,15 +177,23 @@ class BatteryParameters:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SensorMounts:
-    """Where the sensors are, in the base frame; LIDAR and camera look along x."""
+    """Where the sensors are, in the base frame; camera and LIDAR look along x, the latter if not turned."""
 
     imu: tuple[float, float, float]  # m
     lidar: tuple[float, float, float]  # m
     camera: tuple[float, float, float]  # m
     camera_view_deg: float = 63.0  # degrees, from the left edge of a picture to its right edge
+    lidar_rpy_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)  # degrees, roll, pitch, yaw of its scan plane
 
     def __post_init__(self) -> None:
         require_range(10.0, 150.0, camera_view_deg=self.camera_view_deg)
+        for name, angle in zip(("roll", "pitch", "yaw"), self.lidar_rpy_deg, strict=True):
+            require_range(-30.0, 30.0, **{f"lidar_rpy_deg ({name})": angle})
+
+    @property
+    def lidar_rotation(self) -> FloatArray:
+        """(3, 3) rotation from the LIDAR's frame (scan plane x-y, x forward) to the base frame."""
+        return rotation_from_rpy(np.radians(self.lidar_rpy_deg))
 
     def focal_length(self, width: int) -> float:
         """Focal length in pixels of pictures that are `width` pixels wide."""

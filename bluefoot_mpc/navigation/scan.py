@@ -85,6 +85,7 @@ class ScanReader:
     def __init__(self, config: ScanConfig, mounts: SensorMounts) -> None:
         self._config = config
         self._mount = mounts.lidar
+        self._turn = mounts.lidar_rotation if any(mounts.lidar_rpy_deg) else None
         self._bearing = self._newest = np.zeros(0)
         self._directions = np.zeros((0, 2))
         self._fault = "no rays"
@@ -124,7 +125,12 @@ class ScanReader:
         origin = np.array((cp * x + sp * (sr * y + cr * z), cr * y - sr * z))
         lift = -sp * x + cp * (sr * y + cr * z) + estimate.height
         level = np.array(((cp, 0.0), (sp * sr, cr)))
-        return level, np.array((-sp, cp * sr)), origin, lift
+        rise = np.array((-sp, cp * sr))
+        if self._turn is not None:
+            # The sensor's own tilt in the trunk comes first.
+            tilt = np.array(((cp, sp * sr, sp * cr), (0.0, cr, -sr), (-sp, cp * sr, cp * cr))) @ self._turn
+            level, rise = tilt[:2, :2].T, tilt[2, :2]
+        return level, rise, origin, lift
 
     def _on_the_floor(self, distance: FloatArray, rise: FloatArray, lift: float) -> BoolArray | bool:
         """(n,) True where a ray ends so low that it must have met the floor; False where none can."""

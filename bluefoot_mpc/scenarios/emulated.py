@@ -164,8 +164,8 @@ def emulate(
 
 
 def _lidar(model: RobotModel, plant: SimPlant, seed: int) -> EmulatedLidar:
-    mount, errors = model.parameters.sensors.lidar, plant.config.lidar
-    lidar = RaycastLidar(plant.model, plant.data, plant.trunk, mount, errors, seed)
+    mounts, errors = model.parameters.sensors, plant.config.lidar
+    lidar = RaycastLidar(plant.model, plant.data, plant.trunk, mounts, errors, seed)
     return EmulatedLidar(PlantLidar(plant, lidar))
 
 

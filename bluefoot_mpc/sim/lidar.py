@@ -8,7 +8,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from bluefoot_mpc.geometry import rotation_from_rpy
 from bluefoot_mpc.io.lidar.geometry import GREATEST_RANGE, LEAST_RANGE, POINTS, bearings
+from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.sim.randomization import stream
 from bluefoot_mpc.sim.sight_config import LidarConfig
 from bluefoot_mpc.sim.terrain import WORLD_GROUPS
@@ -33,7 +35,7 @@ class RaycastLidar:
         model: MuJoCo model.
         data: its state, kinematics up to date.
         trunk: body that carries the sensor.
-        mount: m, mounting point in the trunk's frame; the scan plane is the trunk's x-y plane there.
+        mounts: where the sensor is on the trunk, and how its scan plane is turned there.
         config: errors of the sensor.
         seed: of the run; the LIDAR draws from a stream of its own.
     """
@@ -43,13 +45,15 @@ class RaycastLidar:
         model: mujoco.MjModel,
         data: mujoco.MjData,
         trunk: int,
-        mount: tuple[float, float, float],
+        mounts: SensorMounts,
         config: LidarConfig | None = None,
         seed: int = 0,
     ) -> None:
         self._model, self._data, self._trunk = model, data, trunk
-        self._mount = np.array(mount)
         self._config, self._seed = config or LidarConfig(), seed
+        self._mount = np.array(mounts.lidar)
+        error = rotation_from_rpy(np.radians(self._config.mount_error_deg))
+        self._turn = mounts.lidar_rotation @ error
         self._plane = np.zeros((POINTS, 2))
         self._rays = np.zeros((POINTS, 3))
         self._distance = np.zeros(POINTS)
@@ -89,7 +93,7 @@ class RaycastLidar:
         origin = self._data.xpos[self._trunk] + rotation @ self._mount
         np.cos(bearing, out=self._plane[:, 0])
         np.sin(bearing, out=self._plane[:, 1])
-        np.matmul(self._plane, rotation[:, :2].T, out=self._rays)
+        np.matmul(self._plane, (rotation @ self._turn)[:, :2].T, out=self._rays)
         # Bodies of the robot are among those that are looked at: the groups leave them out.
         mujoco.mj_multiRay(
             self._model, self._data, origin, self._rays.reshape(-1), WORLD_GROUPS, True, self._trunk,

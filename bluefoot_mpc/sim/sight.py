@@ -38,7 +38,7 @@ class Sight:
     def __init__(self, world: World, mounts: SensorMounts, config: SimConfig, seed: int) -> None:
         self._world, self._dt = world, config.physics_period
         body = (world.model, world.data, world.trunk)
-        self._lidar = RaycastLidar(*body, mounts.lidar, config.lidar, seed) if config.lidar.enabled else None
+        self._lidar = RaycastLidar(*body, mounts, config.lidar, seed) if config.lidar.enabled else None
         self._camera = None
         if config.camera.enabled:
             self._camera = RenderedCamera(*body, mounts.camera, mounts.camera_view_deg, config.camera, seed)

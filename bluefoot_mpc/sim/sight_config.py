@@ -17,6 +17,8 @@ class LidarConfig:
     noise_far: float = 0.01  # of the range, standard deviation beyond near_range
     dropouts: float = 0.005  # share of rays without an echo
     jitter_deg: float = 0.05  # degrees, standard deviation of a ray's bearing
+    # degrees; how the sensor is really turned (roll, pitch, yaw), beside what the robot's parameter file says
+    mount_error_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         require_nonnegative(
@@ -24,6 +26,8 @@ class LidarConfig:
             jitter_deg=self.jitter_deg,
         )  # fmt: skip
         require_range(0.0, 1.0, dropouts=self.dropouts)
+        for name, angle in zip(("roll", "pitch", "yaw"), self.mount_error_deg, strict=True):
+            require_range(-20.0, 20.0, **{f"mount_error_deg ({name})": angle})
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

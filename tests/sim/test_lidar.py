@@ -57,7 +57,7 @@ def place(world, x=0.0, yaw=0.0, pitch_legs=0.0):
 
 
 def lidar(world, robot, errors=None, seed=0):
-    return RaycastLidar(world.model, world.data, world.trunk, robot.parameters.sensors.lidar, errors, seed)
+    return RaycastLidar(world.model, world.data, world.trunk, robot.parameters.sensors, errors, seed)
 
 
 def test_walls_are_where_they_are(world, robot):
