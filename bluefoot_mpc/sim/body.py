@@ -78,7 +78,7 @@ class SimBody:
             ),
             _plant(self._world),
         )
-        self._ground = Ground(config.world, self._world.model, self._world.data)
+        self._ground = Ground(config.world, self._world.model, self._world.data, self._plan)
         self._truth = TruthReader(self._world, self._ground, self._bank, robot.parameters.legs.foot_radius)
         windows = -(-self._steps // self._imu_steps)
         self._inertial = InertialWindows(robot.parameters.sensors.imu, config.sensors.imu_period, windows)

@@ -18,7 +18,19 @@ OPEN_WORLDS = ("flat", "rough", "slope", "steps")
 PLANNED_WORLDS = ("room", "corridors", "chairs", "maze", "dead_ends", "hidden", "arena")
 """Names of the worlds in which things stand; the seed decides where."""
 
-WORLDS = (*OPEN_WORLDS, *PLANNED_WORLDS)
+TERRAIN_WORLDS = ("rubble", "random_steps", "ramp", "kerb", "gap", "stones")
+"""Names of the worlds of rough ground, flat where the robot starts; the seed decides how it lies."""
+
+TERRAIN_HEIGHTS = {"rubble": 0.020, "random_steps": 0.020, "ramp": 0.070, "kerb": 0.025, "stones": 0.006}
+"""m, highest over lowest of the ground ahead where none is given; a gap has its width instead."""
+
+GREATEST_TERRAIN = 0.10
+"""m; the robot's trunk is 0.11 m above the ground, so that nothing higher is ground to it."""
+
+GREATEST_STONES = 0.05
+"""m; the floor between the stones is 0.08 m down."""
+
+WORLDS = (*OPEN_WORLDS, *PLANNED_WORLDS, *TERRAIN_WORLDS)
 """Names of the worlds that ship."""
 
 DEFAULT_SLOPE_DEG = 5.0
@@ -40,6 +52,10 @@ class WorldConfig:
     rough_height: float = 0.010  # m, highest point over lowest of the world "rough"
     rough_wavelength: float = 0.15  # m, size of the bumps
     rough_seed: int = 0  # shape of the terrain
+    terrain_height: float = 0.0  # m, highest over lowest of one of TERRAIN_WORLDS; 0 takes TERRAIN_HEIGHTS
+    ramp_deg: float = 10.0  # degrees, up and down, of the world "ramp"
+    gap: float = 0.06  # m, width of the gap of "gap"; between "stones" on average
+    stone: float = 0.12  # m, side of one of the "stones"
     payload: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)  # kg; x, y, z m on the trunk
 
     def __post_init__(self) -> None:
@@ -66,11 +82,37 @@ class WorldConfig:
                 f"the world '{self.name}' is level: leave slope_deg = {self.slope_deg:g} out,"
                 f" or take one of: {', '.join(OPEN_WORLDS)}"
             )
+        self._require_terrain()
+
+    def _require_terrain(self) -> None:
+        """Refuse rough ground that cannot be, and figures of it that would have no effect."""
+        greatest = GREATEST_STONES if self.name == "stones" else GREATEST_TERRAIN
+        require_range(0.0, greatest, terrain_height=self.terrain_height)
+        require_range(3.0, 30.0, ramp_deg=self.ramp_deg)
+        require_range(0.01, 0.30, gap=self.gap)
+        require_range(0.03, 0.50, stone=self.stone)
+        for name, default, worlds in (
+            ("terrain_height", 0.0, tuple(TERRAIN_HEIGHTS)),
+            ("ramp_deg", 10.0, ("ramp",)),
+            ("gap", 0.06, ("gap", "stones")),
+            ("stone", 0.12, ("stones",)),
+        ):
+            value = getattr(self, name)
+            if value != default and self.name not in worlds:
+                raise ConfigurationError(
+                    f"{name} = {value:g} has no effect in the world '{self.name}': leave it out,"
+                    f" or take one of: {', '.join(worlds)}"
+                )
 
     @property
     def is_planned(self) -> bool:
-        """True where things stand on level floor as a plan says: from a seed, or from a file."""
-        return self.name in PLANNED_WORLDS or self.name.endswith(".toml")
+        """True where a plan says what stands on the floor: from a seed, or from a file."""
+        return self.name in (*PLANNED_WORLDS, *TERRAIN_WORLDS) or self.name.endswith(".toml")
+
+    @property
+    def relief(self) -> float:
+        """Highest over lowest of the ground of one of `TERRAIN_WORLDS`, m; zero without."""
+        return self.terrain_height or TERRAIN_HEIGHTS.get(self.name, 0.0)
 
     @property
     def slope(self) -> float:
@@ -194,7 +236,8 @@ class SimConfig:
         require_range(0.0, 1.0, latency=self.latency)
         if self.backlash_deg is not None:
             require_range(0.0, 5.0, backlash_deg=self.backlash_deg)
-        if self.leader.kind and (self.world.name in {"rough", "steps"} or self.world.slope != 0.0):
+        uneven = ("rough", "steps", *TERRAIN_WORLDS)
+        if self.leader.kind and (self.world.name in uneven or self.world.slope != 0.0):
             raise ConfigurationError(
                 f"a leader drives on level floor: world '{self.world.name}' is none; take flat or arena"
             )

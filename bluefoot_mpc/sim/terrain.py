@@ -10,6 +10,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from bluefoot_mpc.sim.config import WorldConfig
+from bluefoot_mpc.sim.worlds.heights import Relief
+from bluefoot_mpc.sim.worlds.plan import WorldPlan
 from bluefoot_mpc.types import FloatArray
 
 WORLD_GROUPS = np.array([1, 1, 0, 0, 0, 0], dtype=np.uint8)
@@ -24,14 +26,20 @@ _GROUND_RGBA = (0.82, 0.80, 0.74, 1.0)
 _STEP_RGBA = (0.70, 0.66, 0.58, 1.0)
 
 
-def add_ground(spec: mujoco.MjSpec, config: WorldConfig) -> None:
-    """Add a shipped world's ground to the world body, tilted by the slope about the origin."""
+def add_ground(spec: mujoco.MjSpec, config: WorldConfig, floor: float = 0.0) -> None:
+    """Add a shipped world's ground to the world body, tilted by the slope about the origin.
+
+    Args:
+        spec: to add to.
+        config: of the world.
+        floor: m, height of the plane.
+    """
     half = -0.5 * config.slope
     frame = spec.worldbody.add_frame(quat=[math.cos(half), 0.0, math.sin(half), 0.0])
     if config.name == "rough":
         _add_rough(spec, frame, config)
     else:
-        _add_plane(spec, frame, 0.0)
+        _add_plane(spec, frame, floor)
     if config.name == "steps":
         _add_steps(spec, frame, config)
 
@@ -53,15 +61,26 @@ def rough_heights(config: WorldConfig) -> FloatArray:
 
 
 class Ground:
-    """Height of the ground, by formula where it is a plane and by a ray elsewhere.
+    """Height of the ground, by formula where it is a plane or pieces of a plan, by a ray elsewhere.
 
     Attributes:
-        is_plane: True where nothing rises from the plane.
+        is_plane: True where nothing rises from the plane that is ground.
+
+    Args:
+        config: of the world.
+        model: MuJoCo model.
+        data: its state.
+        plan: of the world, where there is one.
     """
 
-    def __init__(self, config: WorldConfig, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    def __init__(
+        self, config: WorldConfig, model: mujoco.MjModel, data: mujoco.MjData, plan: WorldPlan | None = None
+    ) -> None:
         self._model, self._data = model, data
-        self.is_plane = config.name in {"flat", "slope"} or config.is_planned
+        self._relief = None
+        if plan is not None and not plan.is_even:
+            self._relief = Relief((solid for solid in plan.solids if solid.is_ground), plan.floor)
+        self.is_plane = self._relief is None and (config.name in {"flat", "slope"} or plan is not None)
         self._tilt = math.tan(config.slope)
         self._cosine = math.cos(config.slope)
         self._hit = np.zeros(1, dtype=np.int32)
@@ -73,10 +92,12 @@ class Ground:
         Args:
             x: m in world.
             y: m in world.
-            above: m, height to look down from: what hangs higher is no ground.
+            above: m, height to look down from: what hangs higher is no ground. A plan's ground hangs nowhere.
         """
         if self.is_plane:
             return x * self._tilt
+        if self._relief is not None:
+            return float(self._relief.height(np.array([x, y])))
         start = np.array([x, y, above])
         distance = mujoco.mj_ray(
             self._model, self._data, start, self._down, WORLD_GROUPS, True, -1, self._hit
@@ -86,12 +107,16 @@ class Ground:
     def clearance(self, points: FloatArray, radius: float) -> FloatArray:
         """Distance of balls to the ground (n,), m: normal to a plane, vertical elsewhere.
 
+        On the ground of a plan it is how far a ball can sink until it touches something, be it an edge.
+
         Args:
             points: (n, 3) m, centres in world.
             radius: m.
         """
         if self.is_plane:
             return np.asarray(self.plane_clearance(points[:, 0], points[:, 2], radius))
+        if self._relief is not None:
+            return self._relief.clearance(points, radius)
         ground = [self.height(p[0], p[1], p[2]) for p in points.tolist()]
         return np.asarray(points[:, 2] - ground - radius)
 

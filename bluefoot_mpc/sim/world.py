@@ -92,7 +92,7 @@ def _add_world(spec: mujoco.MjSpec, config: WorldConfig, plan: WorldPlan | None)
         spec.worldbody.add_light(
             pos=[0.0, 0.0, 4.0], dir=[0.2, 0.1, -1.0], type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         )
-        add_ground(spec, config)
+        add_ground(spec, config, plan.floor if plan is not None else 0.0)
         if plan is not None:
             add_plan(spec, plan)
         return

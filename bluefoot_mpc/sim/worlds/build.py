@@ -6,7 +6,7 @@ import math
 
 import mujoco
 
-from bluefoot_mpc.sim.worlds.plan import Marker, WorldPlan
+from bluefoot_mpc.sim.worlds.plan import Marker, Solid, WorldPlan
 
 FLOOR_GROUP, THING_GROUP = 0, 1
 """MuJoCo geom groups of the ground, and of what stands on it."""
@@ -23,18 +23,24 @@ def add_plan(spec: mujoco.MjSpec, plan: WorldPlan) -> None:
     kinds = {"box": mujoco.mjtGeom.mjGEOM_BOX, "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER}
     for solid in plan.solids:
         length, width, height = (0.5 * size for size in solid.size)
-        half = 0.5 * solid.yaw
         geom = spec.worldbody.add_geom(
             name=solid.name,
             type=kinds[solid.shape],
             size=[length, width, height] if solid.shape == "box" else [length, height, 0.0],
             pos=[solid.x, solid.y, solid.z],
-            quat=[math.cos(half), 0.0, 0.0, math.sin(half)],
+            quat=_quaternion(solid),
         )
-        geom.group = THING_GROUP
+        geom.group = FLOOR_GROUP if solid.is_ground else THING_GROUP
         geom.rgba = [*solid.colour, 1.0]
     if plan.marker is not None:
         _add_marker(spec, plan.marker)
+
+
+def _quaternion(solid: Solid) -> list[float]:
+    """Attitude of a solid, wxyz: pitched, then turned."""
+    yaw, pitch = 0.5 * solid.yaw, 0.5 * solid.pitch
+    c, s = math.cos(yaw), math.sin(yaw)
+    return [c * math.cos(pitch), -s * math.sin(pitch), c * math.sin(pitch), s * math.cos(pitch)]
 
 
 def _add_marker(spec: mujoco.MjSpec, marker: Marker) -> None:

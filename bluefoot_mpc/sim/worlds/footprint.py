@@ -17,8 +17,8 @@ _SPACING = 0.02  # m between points of an outline
 
 
 def in_the_way(solids: Iterable[Solid]) -> tuple[Solid, ...]:
-    """The solids that begin below the robot's head."""
-    return tuple(solid for solid in solids if solid.z - 0.5 * solid.size[2] < HEADROOM)
+    """The solids that begin below the robot's head and are no ground to walk on."""
+    return tuple(s for s in solids if not s.is_ground and s.z - 0.5 * s.size[2] < HEADROOM)
 
 
 def crossing(solids: Iterable[Solid], height: float) -> tuple[Solid, ...]:

@@ -21,7 +21,7 @@ _BOUNDS = ("least_x", "least_y", "greatest_x", "greatest_y")
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Solid:
-    """One thing that stands on (or hangs over) the floor and does not move."""
+    """One thing that stands on (or hangs over) the floor and does not move, or a piece of the ground."""
 
     name: str
     shape: Shape
@@ -30,6 +30,8 @@ class Solid:
     z: float  # m
     size: tuple[float, float, float]  # m: length, width, height; of a cylinder diameter twice and height
     yaw: float = 0.0  # rad, left
+    pitch: float = 0.0  # rad, of a piece of ground, nose down positive; turned before yaw
+    is_ground: bool = False  # to be walked on: no thing in the way, and no collision
     colour: tuple[float, float, float] = (0.72, 0.70, 0.66)  # red, green, blue, 0..1
 
     def __post_init__(self) -> None:
@@ -50,8 +52,11 @@ class Solid:
             raise ConfigurationError(
                 f"size = {list(self.size)}: a cylinder is as wide as long: [diameter, diameter, height]"
             )
-        if self.z + 0.5 * height <= 0.0:
-            raise ConfigurationError(f"it is below the floor: z = {self.z:g} is its middle")
+        require_range(-0.8, 0.8, pitch=self.pitch)
+        if self.pitch != 0.0 and not (self.is_ground and self.shape == "box"):
+            raise ConfigurationError(
+                f"pitch = {self.pitch:g}: only boxes of the ground are tilted: leave it out, or set is_ground"
+            )
         red, green, blue = self.colour
         require_range(0.0, 1.0, red=red, green=green, blue=blue)
 
@@ -79,7 +84,7 @@ class Marker:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class WorldPlan:
-    """A world on level floor. The robot starts at the origin and looks along x.
+    """A world on level floor. The robot starts at the origin, on ground at height zero, and looks along x.
 
     Attributes:
         name: of the kind of world.
@@ -87,6 +92,7 @@ class WorldPlan:
         bounds: m, least x, least y, greatest x, greatest y of the floor that counts.
         solids: what stands in it, walls too.
         marker: None where there is none, or a leader carries it.
+        floor: m, height of the floor; below zero the robot starts on a piece of ground.
     """
 
     name: str
@@ -94,12 +100,10 @@ class WorldPlan:
     bounds: tuple[float, float, float, float]
     solids: tuple[Solid, ...]
     marker: Marker | None = None
+    floor: float = 0.0
 
     def __post_init__(self) -> None:
-        names = [solid.name for solid in self.solids]
-        twice = next((name for name in names if names.count(name) > 1), None)
-        if twice is not None:
-            raise ConfigurationError(f"world '{self.name}': two solids have the name '{twice}'")
+        self._require_solids()
         require_finite(bounds=self.bounds)
         least_x, least_y, greatest_x, greatest_y = self.bounds
         if least_x >= greatest_x or least_y >= greatest_y:
@@ -112,6 +116,27 @@ class WorldPlan:
             raise ConfigurationError(
                 f"world '{self.name}': its bounds must hold the origin, where the robot starts"
             )
+        self._require_marker()
+
+    @property
+    def is_even(self) -> bool:
+        """True where the floor is all the ground there is."""
+        return self.floor == 0.0 and not any(solid.is_ground for solid in self.solids)
+
+    def _require_solids(self) -> None:
+        require_range(-1.0, 0.0, floor=self.floor)
+        seen: set[str] = set()
+        for solid in self.solids:
+            if solid.name in seen:
+                raise ConfigurationError(f"world '{self.name}': two solids have the name '{solid.name}'")
+            seen.add(solid.name)
+            if solid.z + 0.5 * solid.size[2] <= self.floor:
+                raise ConfigurationError(
+                    f"solid '{solid.name}': it is below the floor: z = {solid.z:g} is its middle"
+                )
+
+    def _require_marker(self) -> None:
+        least_x, least_y, greatest_x, greatest_y = self.bounds
         marker = self.marker
         if marker is not None and not (
             least_x <= marker.x <= greatest_x and least_y <= marker.y <= greatest_y

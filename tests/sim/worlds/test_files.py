@@ -71,7 +71,7 @@ def test_a_small_file_is_filled_up(tmp_path):
         ("[0.3, 0.3, 0.4]", "[0.3, 1e200, 0.4]", "width = 1e\\+200 must lie in 0..120"),
         ("3.0, 1.0]", "1e308, 1.0]", "greatest_x = 1e\\+308 must lie in -60..60"),
         ("-1.0, -1.0, 3.0, 1.0", "3.0, -1.0, -1.0, 1.0", "least x and least y come first"),
-        ("bounds = ", "colour = 3\nbounds = ", "unknown key 'colour'. .*Valid: bounds, marker"),
+        ("bounds = ", "colour = 3\nbounds = ", "unknown key 'colour'. .*Valid: bounds, floor, marker"),
         ("bounds = ", "bounds == ", "is not a TOML file"),
     ],
 )  # fmt: skip
