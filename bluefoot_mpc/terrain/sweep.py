@@ -24,15 +24,16 @@ MAX_LEVELS = 400
 class SweepConfig:
     """Range, levels and pace of a sweep."""
 
-    pitch_min_deg: float = 10.5  # degrees nose down; the plane then meets level ground 1.3 m ahead
-    pitch_max_deg: float = 31.0  # degrees nose down; 0.45 m ahead
+    pitch_min_deg: float = 11.0  # degrees nose down; the plane then meets level ground 1.27 m ahead
+    pitch_max_deg: float = 31.0  # degrees nose down; 0.44 m ahead
     spacing: Literal["ground", "pitch"] = "ground"  # levels even along level ground, or even in pitch
     ground_step: float = 0.014  # m between the lines of neighbouring levels on level ground
     count: int = 40  # steps between levels that are even in pitch (N_s in the thesis)
     rate_gain: float = 4.0  # 1/s, alpha_theta of the law
-    max_rate: float = 0.35  # rad/s, of the wanted pitch
+    max_rate: float = 0.50  # rad/s, of the wanted pitch
     max_lead_deg: float = 3.0  # degrees that the wanted pitch may be off the level, for a trunk that sticks
     tolerance_deg: float = 0.25  # degrees off a level that a scan of it may be
+    slack: float = 0.75  # of the way to the next level, that a scan may be off where that is more
     quiet_rate: float = 0.10  # rad/s of the trunk, at most, during a scan of a level
     dwell_scans: int = 1  # scans a level
     level_timeout: float = 0.6  # s after which a level is given up
@@ -60,6 +61,7 @@ class SweepConfig:
         require_range(1, MAX_LEVELS, count=self.count)
         require_range(1, 50, dwell_scans=self.dwell_scans)
         require_range(0.002, 0.5, ground_step=self.ground_step)
+        require_range(0.0, 1.0, slack=self.slack)
         require_finite(forward=self.forward)
         require_nonnegative(raised=self.raised)
 

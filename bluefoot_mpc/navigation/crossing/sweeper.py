@@ -5,12 +5,13 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.navigation.crossing.pose_track import PoseTrack
-from bluefoot_mpc.terrain.cloud import CloudConfig, scan_points
+from bluefoot_mpc.terrain.cloud import CloudConfig, lidar_place, scan_points
 from bluefoot_mpc.terrain.sweep import SweepConfig, advance, levels
 from bluefoot_mpc.types import BodyState, FloatArray, LidarScan, SensorFrame, TrunkPose
 
@@ -35,6 +36,8 @@ class SweepStep:
         position: (3,) m, wanted shift of the trunk over its feet.
         reached: levels that were reached so far.
         count: levels in all.
+        time: s, end of the scan whose points these are; NaN where there are none.
+        origin: (3,) m, where the LIDAR then was, odometry frame; NaN where there are no points.
     """
 
     pitch: float
@@ -45,11 +48,24 @@ class SweepStep:
     position: FloatArray = field(default_factory=lambda: np.zeros(3))
     reached: int = 0
     count: int = 0
+    time: float = math.nan
+    origin: FloatArray = field(default_factory=lambda: np.full(3, np.nan))
 
     @property
     def trunk(self) -> TrunkPose:
         """The wanted offset of the trunk."""
         return TrunkPose(position=self.position, rpy=np.array([0.0, self.pitch, 0.0]))
+
+
+class _Seen(NamedTuple):
+    """Points of a scan (k, 3), its time, and where the LIDAR was (3,)."""
+
+    points: FloatArray
+    time: float
+    origin: FloatArray
+
+
+_NOTHING = _Seen(np.zeros((0, 3)), math.nan, np.full(3, np.nan))
 
 
 class _Stage(enum.Enum):
@@ -83,7 +99,7 @@ class Sweeper:
         self._heard, self._scan_time, self._fault = -math.inf, -math.inf, ""
         self._enter(_Stage.IDLE, -math.inf)
         self._wanted, self._level, self._scans = 0.0, 0, 0
-        self._reached, self._missed_in_a_row, self._reason = 0, 0, ""
+        self._reached, self._missed_in_a_row, self._reason = 0, 0, "no sweep was begun"
 
     def begin(self, time: float) -> None:
         """Start a sweep.
@@ -92,7 +108,7 @@ class Sweeper:
             time: s, of the frame.
         """
         self.reset()
-        self._heard = time
+        self._heard, self._reason = time, ""
         self._enter(_Stage.APPROACH, time)
 
     def step(self, frame: SensorFrame, estimate: BodyState, dt: float) -> SweepStep:
@@ -104,7 +120,7 @@ class Sweeper:
             dt: s.
         """
         if self._stage is _Stage.IDLE:
-            return SweepStep(pitch=0.0, done=True, reason=self._reason or "no sweep was begun")
+            return self._step(_NOTHING)
         time = frame.time
         trusted = estimate.healthy and bool(
             np.isfinite(estimate.position).all() and np.isfinite(estimate.rpy).all()
@@ -114,20 +130,21 @@ class Sweeper:
         scan = self._usable(frame.lidar, time)
         if self._stage is not _Stage.RETURN:
             self._watch(time, trusted)
-        points = np.zeros((0, 3))
+        seen = _NOTHING
         if self._stage is _Stage.APPROACH:
             self._approach(estimate, time, dt)
         elif self._stage is _Stage.LEVELS:
-            points = self._look(scan, estimate, time, dt)
+            seen = self._look(scan, estimate, time, dt)
         if self._stage is _Stage.RETURN:
             self._go_back(estimate, trusted, time, dt)
-        return self._step(points)
+        return self._step(seen)
 
-    def _step(self, points: FloatArray) -> SweepStep:
+    def _step(self, seen: _Seen) -> SweepStep:
         config, done = self._config, self._stage is _Stage.IDLE
         shifted = self._stage in (_Stage.APPROACH, _Stage.LEVELS)
         return SweepStep(
-            pitch=self._wanted, points=points, done=done, reason=self._reason,
+            pitch=self._wanted, done=done, reason=self._reason,
+            points=seen.points, time=seen.time, origin=seen.origin,
             level=self._level if self._stage is _Stage.LEVELS else -1,
             position=np.array((config.forward, 0.0, config.raised)) if shifted else np.zeros(3),
             reached=self._reached, count=len(self._levels),
@@ -168,16 +185,18 @@ class Sweeper:
         if abs(first - pitch) <= self._tolerance or time - self._since > config.approach_time:
             self._enter(_Stage.LEVELS, time)
 
-    def _look(self, scan: LidarScan | None, estimate: BodyState, time: float, dt: float) -> FloatArray:
+    def _look(self, scan: LidarScan | None, estimate: BodyState, time: float, dt: float) -> _Seen:
         """At the present level; then on to the next."""
-        config, points = self._config, np.zeros((0, 3))
+        config, seen = self._config, _NOTHING
         level = float(self._levels[self._level])
         if scan is not None:
             pose = self._track.at(scan.time)
-            counts = abs(pose.pitch - level) <= self._allowed() and pose.rate <= config.quiet_rate
+            quiet = pose.rate <= config.quiet_rate
+            counts = quiet and abs(pose.pitch - level) <= self._allowed()
             self._scans += counts
-            if counts or config.use_all_scans:
+            if counts or (quiet and config.use_all_scans):
                 points = scan_points(scan, pose.position, pose.quaternion, self._mounts, self._cloud)
+                seen = _Seen(points, scan.time, lidar_place(pose.position, pose.quaternion, self._mounts))
         self._wanted = advance(self._wanted, level, float(estimate.rpy[1]), dt, config)
         if self._scans >= config.dwell_scans:
             self._reached, self._missed_in_a_row = self._reached + 1, 0
@@ -185,12 +204,12 @@ class Sweeper:
         elif time - self._since > config.level_timeout:
             self._missed_in_a_row += 1
             self._next(time)
-        return points
+        return seen
 
     def _allowed(self) -> float:
-        """How far (rad) a scan may be off the level: nearer to it than to its neighbours is enough."""
+        """How far (rad) a scan may be off the level: those far apart need not be met as well."""
         gaps = np.diff(self._levels[max(self._level - 1, 0) : self._level + 2])
-        return max(self._tolerance, 0.5 * float(gaps.min()))
+        return max(self._tolerance, self._config.slack * float(gaps.min()))
 
     def _next(self, time: float) -> None:
         """On to the next level, or back."""
