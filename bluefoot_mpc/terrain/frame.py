@@ -69,3 +69,25 @@ def heights_at(ground: HeightMap, places: FloatArray) -> FloatArray:
     i, j = cells_of(ground, places)
     found = np.where(i >= 0, ground.height[i, j], np.nan)
     return np.asarray(found + ground.pose[2])
+
+
+def bilinear(ground: HeightMap, layers: FloatArray, places: FloatArray) -> FloatArray:
+    """(..., k) values between the centres of a map's cells; NaN where one of the four around is, or outside.
+
+    Args:
+        ground: the map, for its frame and cells.
+        layers: (n, m, k) values of its cells, such as heights and slopes.
+        places: (..., 2) m in the odometry frame.
+    """
+    n, m = ground.height.shape
+    at = to_map(ground, places) / ground.cell - 0.5
+    low = np.floor(at)
+    inside = (low >= 0.0).all(axis=-1) & (low[..., 0] < m - 1) & (low[..., 1] < n - 1)
+    low = np.where(inside[..., None], low, 0.0)
+    j, i = np.moveaxis(low.astype(np.intp), -1, 0)
+    along, aside = np.moveaxis(at - low, -1, 0)[..., None]
+    if n < 2 or m < 2:
+        return np.full((*at.shape[:-1], layers.shape[-1]), np.nan)
+    near = layers[i, j] * (1.0 - along) + layers[i, j + 1] * along
+    far = layers[i + 1, j] * (1.0 - along) + layers[i + 1, j + 1] * along
+    return np.where(inside[..., None], near * (1.0 - aside) + far * aside, np.nan)
