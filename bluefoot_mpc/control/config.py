@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from bluefoot_mpc.control.body_planner import BodyPlannerConfig
+from bluefoot_mpc.control.foot_placer import PlacerConfig
 from bluefoot_mpc.control.gait_sway import SwayConfig
 from bluefoot_mpc.control.ground import GroundAdaptationConfig
 from bluefoot_mpc.control.modes import ModeConfig
@@ -35,6 +36,7 @@ class ControlConfig:
     navigation: NavigationConfig = field(default_factory=NavigationConfig)
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
     ground: GroundAdaptationConfig = field(default_factory=GroundAdaptationConfig)
+    placer: PlacerConfig = field(default_factory=PlacerConfig)
     push_recovery: PushRecoveryConfig = field(default_factory=PushRecoveryConfig)
     whole_body: BodyPlannerConfig = field(default_factory=BodyPlannerConfig)
     servo: ServoMapConfig = field(default_factory=ServoMapConfig)

@@ -16,6 +16,7 @@ from bluefoot_mpc.control import modes, plans, posture, servo_map, tracking
 from bluefoot_mpc.control.body_planner import BodyPlanner, Surroundings
 from bluefoot_mpc.control.command import usable
 from bluefoot_mpc.control.config import ControlConfig
+from bluefoot_mpc.control.foot_placer import FootPlacer
 from bluefoot_mpc.control.gait_sway import GaitSway
 from bluefoot_mpc.control.ground import GroundAdapter
 from bluefoot_mpc.control.guidance import Guidance
@@ -85,6 +86,7 @@ class Pipeline:
         self._planner = BodyPlanner(robot, config.whole_body) if config.whole_body.enabled else None
         self._ground = GroundAdapter(config.ground)
         self._guidance = Guidance(config.navigation, robot.parameters.sensors)
+        self._placer = FootPlacer(geometry, config.placer)
         self._recovery = PushRecovery(config.push_recovery)
         self._step_back = plans.StepBack()
         self._require_reachable()
@@ -102,6 +104,7 @@ class Pipeline:
             self._planner.reset()
         self._ground.reset()
         self._guidance.reset()
+        self._placer.reset()
         self._recovery.reset()
         if self._level is not None:
             self._level.reset()
@@ -149,7 +152,11 @@ class Pipeline:
         walks = self._walks(estimate)
         guided, navigation, found = self._guidance.step(self._wanted, frame, estimate, walks=walks, dt=dt)
         motion = self._in_force(guided, walks)
+        if self._placer.pace < 1.0:  # feet wait for good ground
+            pace = self._placer.pace
+            motion = replace(motion, velocity=pace * motion.velocity, yaw_rate=pace * motion.yaw_rate)
         twist = self._corrected(motion, estimate, upright)
+        self._placer.step(self._guidance.ground, estimate, self._gait, dt)
         gait = self._gait.step(self._gait_inputs(twist, motion, estimate, upright), dt)
         self._walking = gait.phase.walking
         self._tracking = tracking.followed(self._tracking, twist, gait.velocity)
@@ -261,7 +268,9 @@ class Pipeline:
     def _on_the_ground(
         self, gait: GaitOutput, estimate: BodyState, upright: FloatArray, dt: float
     ) -> GaitOutput:
-        """The gait with its feet on the ground's slope."""
+        """The gait with its feet on the ground's slope, or over the mean height of its footholds."""
+        if self._guidance.ground is not None:
+            return replace(gait, foot_position=gait.foot_position - (0.0, 0.0, self._placer.level))
         if not self.config.ground.enabled:
             return gait
         if estimate.healthy:
@@ -341,5 +350,6 @@ class Pipeline:
             # No reflex on a rate that is no longer measured.
             tilt_rate_error=error if estimate.healthy else np.zeros(2),
             # Steps without a plan are not taken: feet in the air land at once.
+            rough=self._guidance.ground is not None,
             halt=self._modes.mode is Mode.SAFE or self._step_back.request.level >= SafetyLevel.HOLD,
         )  # fmt: skip

@@ -1,0 +1,208 @@
+"""Puts the walk's footholds on mapped ground (thesis, chapter 6: planned footholds over terrain).
+
+Maps are in the odometry frame, the gait's footholds in the world of its virtual
+robot. The standing feet are known in both, which gives the shift between the
+two: drift of either and the droop of soft servos fall out. Every tick one leg
+that stands gets a new look at where it goes next; the nearest good ground in
+reach, and a swing that clears what lies in between. Where there is none the
+foot steps where it stands, and the robot waits.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bluefoot_mpc.control.foot_contact import FootContacts, TouchConfig
+from bluefoot_mpc.control.leg_reach import LegReach
+from bluefoot_mpc.gait.ahead import leg_phases
+from bluefoot_mpc.gait.gait import Gait
+from bluefoot_mpc.gait.virtual_robot import VirtualPose, carried
+from bluefoot_mpc.geometry import rotation_from_rpy
+from bluefoot_mpc.model.legs import LegGeometry
+from bluefoot_mpc.settings import require_nonnegative, require_positive
+from bluefoot_mpc.terrain.footholds import ChoiceConfig, choose, height_around, highest_between
+from bluefoot_mpc.terrain.ground import Ground
+from bluefoot_mpc.types import LEGS, BodyState, BoolArray, FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PlacerConfig:
+    """How footholds are put on mapped ground."""
+
+    choice: ChoiceConfig = field(default_factory=ChoiceConfig)
+    touch: TouchConfig = field(default_factory=TouchConfig)
+    room: float = 0.07  # rad that legs keep to their limits where they land and lift
+    sway: float = 0.020  # m that the trunk may be farther from a foot that lands or lifts
+    clearance: float = 0.015  # m above all that a swing passes over
+    least_lift: float = 0.020  # m above where a foot stands, and where it lands
+    width: float = 0.036  # m, of the way that a swing must clear
+    decided: float = 0.06  # s before lift-off, from which the choice stays
+    follow: float = 0.3  # s, time constant of the shift between odometry and gait
+    level_time: float = 0.4  # s, with which the trunk follows the mean height of the feet
+    slow: float = 0.060  # m behind its place, from which a standing foot slows the walk
+    stop: float = 0.085  # m behind its place, at which it stops it
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        require_nonnegative(
+            room=self.room, sway=self.sway, clearance=self.clearance, least_lift=self.least_lift,
+            width=self.width, decided=self.decided, slow=self.slow,
+        )  # fmt: skip
+        require_positive(follow=self.follow, level_time=self.level_time, stop=self.stop)
+
+
+class FootPlacer:
+    """Chooses footholds and swings for a gait on mapped ground.
+
+    Attributes:
+        footholds: (4, 3) m in the odometry frame, ground where the feet land next; NaN where none was chosen.
+        lift: (4,) m that the next swings rise; NaN likewise.
+        waiting: why a foot does not go on, in few words; empty while all do.
+        level: m, height of the plane that the trunk's height counts from, over that of the gait.
+        pace: share of the commanded speed that the footholds allow.
+
+    Args:
+        geometry: legs.
+        config: bounds.
+    """
+
+    def __init__(self, geometry: LegGeometry, config: PlacerConfig) -> None:
+        self._config = config
+        self._reach = LegReach(geometry)
+        self._contacts = FootContacts(config.touch)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the ground."""
+        self._contacts.reset()
+        self._active = False
+        self._turn, self._shift = 0.0, 0j  # odometry to the gait's world
+        self._rise = math.nan  # m, heights of the gait over those of the map
+        self._next = 0
+        self.footholds = np.full((4, 3), np.nan)
+        self.lift = np.full(4, np.nan)
+        self._reasons = [""] * 4
+        self.waiting = ""
+        self.level = 0.0
+        self.pace = 1.0
+
+    def step(self, ground: Ground | None, estimate: BodyState, gait: Gait, dt: float) -> None:
+        """Take one tick's ground and estimate, before the gait advances.
+
+        Args:
+            ground: what to step on; None ends it.
+            estimate: of the body.
+            gait: whose next steps are planned (changed).
+            dt: s.
+        """
+        if ground is None:
+            if self._active:
+                gait.forget_steps()
+                self.reset()
+            return
+        if not estimate.healthy:
+            return
+        places = estimate.position + estimate.foot_position_in_base @ rotation_from_rpy(estimate.rpy).T
+        self._contacts.step(gait, estimate.contact, places[:, 2], dt)
+        self._align(ground, places, estimate.contact, gait, dt)
+        self._active = True
+        self._next = (self._next + 1) % 4
+        self._plan(ground, places, gait, self._next)
+        self.waiting = next((reason for reason in self._reasons if reason), "")
+        self._follow_feet(gait, dt)
+
+    def _align(
+        self, ground: Ground, places: FloatArray, contact: BoolArray, gait: Gait, dt: float
+    ) -> None:
+        """Follow the shift between odometry and the gait's world by the standing feet."""
+        feet = gait.state.feet
+        standing = [leg for leg in range(4) if contact[leg] and not feet[leg].swinging]
+        if len(standing) < 2:
+            return
+        seen = places[standing, 0] + 1j * places[standing, 1]
+        told = np.array([feet[leg].anchor for leg in standing])
+        turn = cmath.phase(complex(((told - told.mean()) * np.conj(seen - seen.mean())).sum()))
+        share = 1.0 if not self._active else min(1.0, dt / self._config.follow)
+        self._turn += share * math.remainder(turn - self._turn, 2.0 * math.pi)
+        shift = complex(told.mean() - cmath.rect(1.0, self._turn) * seen.mean())
+        self._shift += share * (shift - self._shift)
+        rises = [feet[leg].z - height_around(ground, places[leg, :2]) for leg in standing]
+        known = [rise for rise in rises if math.isfinite(rise)]
+        if known:
+            rise = sum(known) / len(known)
+            self._rise = rise if math.isnan(self._rise) else self._rise + share * (rise - self._rise)
+
+    def _to_gait(self, places: FloatArray) -> FloatArray:
+        """(k, 3) places of the odometry frame in the gait's world."""
+        moved = cmath.rect(1.0, self._turn) * (places[:, 0] + 1j * places[:, 1]) + self._shift
+        return np.column_stack([moved.real, moved.imag, places[:, 2] + self._rise])
+
+    def _from_gait(self, place: complex) -> FloatArray:
+        """(2,) m in the odometry frame."""
+        back = (place - self._shift) * cmath.rect(1.0, -self._turn)
+        return np.array([back.real, back.imag])
+
+    def _plan(self, ground: Ground, places: FloatArray, gait: Gait, leg: int) -> None:
+        """Look anew where a standing leg goes next."""
+        state, foot = gait.state, gait.state.feet[leg]
+        if foot.swinging or foot.turning or math.isnan(self._rise):
+            return
+        phase = leg_phases(state)[leg] if state.walking else 0.5
+        wait = (1.0 - phase) * state.cycle
+        if foot.goal is not None and wait < self._config.decided and state.walking:
+            return
+        swing, stance = state.rhythm.share * state.cycle, (1.0 - state.rhythm.share) * state.cycle
+        landing = state.pose.moved(state.velocity, state.yaw_rate, wait + swing)
+        lifting = landing.moved(state.velocity, state.yaw_rate, stance)
+        lead = foot.shape.stance_lead * stance
+        nominal = landing.to_world(carried(foot.nominal, state.velocity, state.yaw_rate, lead))
+
+        def holds(candidates: FloatArray) -> BoolArray:
+            moved = self._to_gait(candidates)
+            return self._held(gait, leg, moved, landing) & self._held(gait, leg, moved, lifting)
+
+        last = self.footholds[leg, :2] if foot.goal is not None and not self._reasons[leg] else None
+        choice = choose(ground, self._from_gait(nominal), holds, last, self._config.choice)
+        self._reasons[leg] = "" if choice.found else f"{LEGS[leg]}: {choice.reason}"
+        self.footholds[leg] = choice.place
+        config = self._config
+        if not choice.found:
+            self.lift[leg] = config.least_lift
+            gait.plan_step(leg, foot.anchor, foot.z, foot.z + config.least_lift)
+            return
+        goal = self._to_gait(choice.place[None])[0]
+        high = highest_between(ground, places[leg, :2], choice.place[:2], config.width) + self._rise
+        top = max(high + config.clearance, foot.z + config.least_lift, float(goal[2]) + config.least_lift)
+        self.lift[leg] = top - foot.z
+        gait.plan_step(leg, complex(goal[0], goal[1]), float(goal[2]), top)
+
+    def _held(self, gait: Gait, leg: int, places: FloatArray, pose: VirtualPose) -> BoolArray:
+        """(k,) whether the leg holds (k, 3) places of the gait's world while the virtual robot is at `pose`."""
+        local = (places[:, 0] + 1j * places[:, 1] - pose.centre) * cmath.rect(1.0, -pose.yaw)
+        nominal = gait.state.feet[leg].nominal
+        away = self._config.sway * nominal / abs(nominal)
+        style = gait.state.style
+        x, y = local.real + away.real - style.trunk_forward, local.imag + away.imag
+        z = places[:, 2] - self.level - style.trunk_height
+        return self._reach.holds(leg, np.column_stack([x, y, z]), self._config.room)
+
+    def _follow_feet(self, gait: Gait, dt: float) -> None:
+        """Height of the trunk's plane, and how fast the walk may go on."""
+        state, config = gait.state, self._config
+        heights = [foot.goal_z if foot.swinging and foot.goal is not None else foot.z for foot in state.feet]
+        self.level += min(1.0, dt / config.level_time) * (sum(heights) / 4.0 - self.level)
+        speed = abs(state.wanted) or abs(state.velocity)
+        if speed == 0.0:
+            self.pace = 1.0
+            return
+        along = (state.wanted or state.velocity) / speed
+        behind = [
+            -((foot.in_b(state.pose) - foot.nominal) * along.conjugate()).real
+            for foot in state.feet if not foot.swinging
+        ]  # fmt: skip
+        worst = max(behind, default=0.0)
+        self.pace = min(1.0, max(0.0, (config.stop - worst) / (config.stop - config.slow)))
