@@ -4,9 +4,9 @@ The same graph, moves, start and goal as the windows of `terrain.windows`, so th
 
 The heuristic is the cheapest way to the goal when one of the two coordinates may be chosen freely in each
 column: once the yaw, once the place sideways; the larger of the two counts. It drops a constraint, so it
-never overestimates, and it is consistent, h(a) <= c(b) + h(b) for every step from a to b. Dijkstra's search on
-the reduced costs c(b) + h(b) - h(a), bounded by what is known to suffice (the best of some greedy ways), is A*.
-Cells whose cheapest way forth and back, by the same two bounds, already costs more never enter the graph.
+never overestimates, and it is consistent, h(a) <= c(b) + h(b) for every step from a to b. Dijkstra's search
+on the reduced costs c(b) + h(b) - h(a), bounded by what is known to suffice (the best of some greedy ways),
+is A*. Cells whose cheapest way from the start and to the goal, by the same bounds, costs more stay out of it.
 """
 
 from __future__ import annotations
@@ -65,6 +65,19 @@ def optimal(cost: FloatArray, start: Start, goal: Goal | None = None) -> Path:
     found[:, 1] += start[1]
     way = reached_path(cost, found)
     return way if way.cost <= greedy.cost else greedy
+
+
+def reachable(cost: FloatArray, start: Start) -> BoolArray:
+    """(n, m, l) True for the finite cells that can be reached from a cell, itself included."""
+    n, m, turns = cost.shape
+    found = np.zeros((n, m, turns), dtype=np.bool_)
+    found[start] = np.isfinite(cost[start])
+    around = np.zeros((n + 2, turns + 2), dtype=np.bool_)
+    for j in range(start[1] + 1, m):
+        around[1:-1, 1:-1] = found[:, j - 1]
+        aside = around[:-2] | around[1:-1] | around[2:]
+        found[:, j] = (aside[:, :-2] | aside[:, 1:-1] | aside[:, 2:]) & np.isfinite(cost[:, j])
+    return found
 
 
 def _bounds(layers: FloatArray, ends: FloatArray) -> FloatArray:
