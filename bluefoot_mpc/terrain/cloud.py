@@ -86,7 +86,7 @@ def scan_points(
     echo = (distance >= least) & (distance <= config.greatest_range) & np.isfinite(bearing)
     distance, bearing = distance[echo], bearing[echo]
     rotation_base_to_world = rotation_from_quaternion(quaternion)
-    plane = (rotation_base_to_world @ lidar_rotation(mount))[:, :2]
+    plane = (rotation_base_to_world @ mount.lidar_rotation)[:, :2]
     in_lidar = np.stack((distance * np.cos(bearing), distance * np.sin(bearing)))
     origin = position + rotation_base_to_world @ np.array(mount.lidar)
     return np.asarray((plane @ in_lidar).T + origin)
@@ -101,8 +101,3 @@ def lidar_place(position: FloatArray, quaternion: FloatArray, mount: SensorMount
         mount: where the LIDAR sits on the base.
     """
     return np.asarray(position + rotation_from_quaternion(quaternion) @ np.array(mount.lidar))
-
-
-def lidar_rotation(mount: SensorMounts) -> FloatArray:
-    """(3, 3) rotation from the LIDAR's frame (its scan plane is x-y) to the base frame."""
-    return mount.lidar_rotation
