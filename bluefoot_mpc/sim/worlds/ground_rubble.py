@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 
@@ -12,11 +11,16 @@ from bluefoot_mpc.sim.worlds.ground_pieces import END, HALF_WIDTH, START, shade,
 from bluefoot_mpc.sim.worlds.plan import Solid
 from bluefoot_mpc.types import BoolArray, FloatArray
 
-COVER = (0.56, 0.60)
+COVER = (0.55, 0.58)
 """Share of the rough ground that blocks cover, drawn from this range by the seed."""
 
-_SIDES = (0.15, 0.12, 0.10, 0.08, 0.06, 0.05, 0.04)
-"""m, sides of blocks from great to small: great ones are put down first, small ones fill what is left."""
+_SIZES = ((0.15, 0.11, 0.72), (0.11, 0.08, 0.88), (0.08, 0.055, 0.97), (0.055, 0.04, 1.0))
+"""Greatest and least length of blocks (m), and the share of the cover reached with them.
+
+Great ones are put down first, small ones fill what is left.
+"""
+_SLIMMEST = 0.7  # width over length, at the least
+_SMALLEST = 0.04  # m
 _LOWEST = 0.002  # m
 _TRIES = 300  # at once
 _ROUNDS = 8  # at the most, for each range of sides
@@ -42,18 +46,21 @@ def _scatter(rng: np.random.Generator, area: float) -> FloatArray:
         area: m², wanted sum of their areas.
     """
     placed = np.zeros((0, 5))
-    for high, low in pairwise(_SIDES):
+    for high, low, share in _SIZES:
         for _ in range(_ROUNDS):
             placed = _add(placed, _draw(rng, low, high))
-            excess = np.cumsum(placed[:, 2] * placed[:, 3]) - area
-            if excess[-1] >= 0.0:
-                return np.asarray(placed[: int(np.argmax(excess >= 0.0)) + 1])
-    return placed
+            covered = np.cumsum(placed[:, 2] * placed[:, 3])
+            if covered[-1] >= share * area:
+                placed = placed[: int(np.argmax(covered >= share * area)) + 1]
+                break
+    return np.asarray(placed)
 
 
 def _draw(rng: np.random.Generator, low: float, high: float) -> FloatArray:
     """Rectangles (n, 5) within the rough ground, whatever is there: x, y, length, width (m), yaw (rad)."""
-    sides = np.round(rng.uniform(low, high, (_TRIES, 2)), 3)
+    length = rng.uniform(low, high, _TRIES)
+    width = np.maximum(length * rng.uniform(_SLIMMEST, 1.0, _TRIES), _SMALLEST)
+    sides = np.round(np.column_stack((length, width)), 3)
     yaw = np.round(rng.uniform(-0.5 * math.pi, 0.5 * math.pi, _TRIES), 4)
     c, s = np.abs(np.cos(yaw)), np.abs(np.sin(yaw))
     reach = 0.5 * np.stack((c * sides[:, 0] + s * sides[:, 1], s * sides[:, 0] + c * sides[:, 1]), axis=1)
@@ -90,7 +97,7 @@ def _touching(one: FloatArray, other: FloatArray) -> BoolArray:
 
 
 def _is_apart(a: FloatArray, b: FloatArray, between: FloatArray) -> BoolArray:
-    """(k,) True where a side of the first lies between rectangles (k, 5) that are `between` (k, 2) m apart."""
+    """(k,) True where a side of the first lies between rectangles (k, 5), `between` (k, 2) m apart."""
     c, s = np.cos(a[:, 4]), np.sin(a[:, 4])
     turned = np.abs(
         np.column_stack((c * between[:, 0] + s * between[:, 1], c * between[:, 1] - s * between[:, 0]))
