@@ -59,6 +59,9 @@ def journey_of(run: RunData, series: RunSeries, robot: RobotModel) -> Journey | 
         series: its time series.
         robot: the robot that ran.
     """
+    if crosses_only(run):
+        # Its sweeps look down at the ground: a map of what stands around would be made of it.
+        return None
     mounts = robot.parameters.sensors
     guided = extract_guided(run, series, mounts)
     if guided is None:
@@ -80,6 +83,12 @@ def journey_of(run: RunData, series: RunSeries, robot: RobotModel) -> Journey | 
         panels += [in_picture(guided, width), distances(guided, run.period)]
     strip = camera_strip(pictures, guided, mounts.camera_view_deg, run.telemetry[0].time)
     return Journey(guided=guided, plan=plan, panels=tuple(panels), strip=tuple(strip))
+
+
+def crosses_only(run: RunData) -> bool:
+    """True of a run that looks at the ground with its LIDAR, and at nothing else."""
+    crosses = any(record.crossing is not None for record in run.telemetry)
+    return crosses and all(record.navigation is None for record in run.telemetry)
 
 
 def _seen_floor(run: RunData, n: int, plan: WorldPlan, mount: FloatArray) -> list[Trace]:

@@ -12,6 +12,7 @@ from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.settings import build
 from bluefoot_mpc.viz.animation import player_script, viewer_script
+from bluefoot_mpc.viz.crossing import crossing_of
 from bluefoot_mpc.viz.journey import journey_of
 from bluefoot_mpc.viz.live import LiveView
 from bluefoot_mpc.viz.page import embed_json, render, scripts
@@ -60,7 +61,11 @@ def replay_html(run: RunData, robot: RobotModel) -> str:
     named = run.config.get("run", {})
     data = replay_data(run, series, robot)
     journey = journey_of(run, series, robot) if len(series.time) else None
-    panels = journey.panels if journey is not None else ()
+    crossing = crossing_of(run, series, robot) if len(series.time) else None
+    panels = (
+        *(journey.panels if journey is not None else ()),
+        *(crossing.panels if crossing is not None else ()),
+    )
     return render(
         "page.html.j2",
         title=f"{named.get('scenario', 'run')}, seed {named.get('seed', '–')}",

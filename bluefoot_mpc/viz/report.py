@@ -11,6 +11,7 @@ from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.settings import dump_toml
 from bluefoot_mpc.viz import plots, plots_ground, plots_level, plots_machine, plots_plan
 from bluefoot_mpc.viz.animation import player_script, viewer_script
+from bluefoot_mpc.viz.crossing import crossing_of
 from bluefoot_mpc.viz.journey import journey_of
 from bluefoot_mpc.viz.level_series import extract_leveling
 from bluefoot_mpc.viz.packing import stretches
@@ -58,9 +59,14 @@ def report_html(
     stall_torque = robot.parameters.servo.stall_torque
     series = extract(run, stall_torque)
     has_ticks = len(series.time) > 0
+    crossing = crossing_of(run, series, robot) if has_ticks else None
     journey = journey_of(run, series, robot) if has_ticks else None
     panels = _panels(run, series, stall_torque, summary.get("figures") or {}) if has_ticks else []
-    panels = [*(journey.panels if journey is not None else ()), *panels]
+    ways = [
+        *(journey.panels if journey is not None else ()),
+        *(crossing.panels if crossing is not None else ()),
+    ]
+    panels = [*ways, *panels]
     judged = verdict(summary, checks)
     data = replay_data(run, series, robot) if has_ticks else {}
     return render(
@@ -80,9 +86,7 @@ def report_html(
         strip_after=journey.strip_after if journey is not None else "",
         run_data=embed_json(data),
         figures=embed_json(figures(panels, series)),
-        **scripts(
-            [*([viewer_script()] if has_ticks else []), *drawing_scripts()], packed=journey is not None
-        ),
+        **scripts([*([viewer_script()] if has_ticks else []), *drawing_scripts()], packed=bool(ways)),
         configuration=dump_toml(run.config).strip() or "none recorded",
         versions=sorted((summary.get("versions") or {}).items()),
         all_figures=_flat(summary),
@@ -123,7 +127,7 @@ def figures(panels: Sequence[Panel], series: RunSeries) -> dict[str, Any]:
             "time": panel.time,
             "follow": panel.window > 0.0,
             "window": panel.window,
-            "full": layout["xaxis"].get("range"),
+            "full": layout.get("xaxis", {}).get("range"),
         }
         if panel.steps:
             found[panel.key]["steps"] = [{"time": step.time, "data": step.data} for step in panel.steps]

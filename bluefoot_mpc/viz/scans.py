@@ -8,13 +8,15 @@ from typing import TypeGuard
 
 import numpy as np
 
-from bluefoot_mpc.geometry import rotation_z
+from bluefoot_mpc.geometry import rotation_z, rpy_from_quaternion
 from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.navigation.scan import LevelScan, ScanConfig, ScanReader
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.sim.worlds import footprint
 from bluefoot_mpc.sim.worlds.coverage import LIDAR_HEIGHT, lidar_pose
+from bluefoot_mpc.sim.worlds.heights import Relief
 from bluefoot_mpc.sim.worlds.plan import WorldPlan
+from bluefoot_mpc.terrain.cloud import scan_points
 from bluefoot_mpc.types import FloatArray, LidarScan
 from bluefoot_mpc.viz.surroundings import plan_of
 
@@ -24,6 +26,8 @@ _LOOKS = 12
 """Sweeps that are compared with a plan."""
 _NEAR, _NOISE, _FIT = 0.06, 0.015, 0.98
 """m, m per metre of range, and share: so many points must lie so near to the plan's outlines."""
+_NOSE_DOWN, _OFF_GROUND, _GROUND_FIT = 0.15, 0.03, 0.9
+"""rad of pitch from which a sweep meets the ground; m and share: so many points must lie so near to it."""
 _LEADER = 0.3
 """m around marker and leader, which stand in no plan."""
 CELL = 0.03
@@ -96,6 +100,8 @@ def plan_fits(plan: WorldPlan, run: RunData, mounts: SensorMounts) -> bool:
         mounts: where the LIDAR is.
     """
     ticks = [k for k, frame in enumerate(run.frames[: len(run.truth)]) if frame.lidar is not None]
+    if not plan.is_even:
+        return _ground_fits(plan, run, ticks, mounts)
     pieces = [_ends(run, k, mounts) for k in ticks[:: max(1, -(-len(ticks) // _LOOKS))]]
     table = np.concatenate([np.zeros((0, 3)), *pieces])
     if not len(table):
@@ -103,6 +109,22 @@ def plan_fits(plan: WorldPlan, run: RunData, mounts: SensorMounts) -> bool:
     solids = footprint.crossing(plan.solids, LIDAR_HEIGHT)
     away = np.abs(footprint.nearest(table[:, :2], solids))
     return float(np.mean(away < _NEAR + _NOISE * table[:, 2])) > _FIT
+
+
+def _ground_fits(plan: WorldPlan, run: RunData, ticks: list[int], mounts: SensorMounts) -> bool:
+    """False where a run's own sweeps over uneven ground met it elsewhere than at its height."""
+    found = [np.zeros((0, 3))]
+    for k in reversed(ticks):
+        sweep, q = run.frames[k].lidar, run.truth[k].q
+        if is_usable(sweep) and float(rpy_from_quaternion(q[3:7])[1]) > _NOSE_DOWN:
+            found.append(scan_points(sweep, q[:3], q[3:7], mounts))
+        if len(found) > _LOOKS:
+            break
+    points = np.concatenate(found)
+    if not len(points):
+        return True
+    off = np.abs(points[:, 2] - Relief(plan.solids, plan.floor).height(points[:, :2]))
+    return float(np.mean(off < _OFF_GROUND)) > _GROUND_FIT
 
 
 def _ends(run: RunData, tick: int, mounts: SensorMounts) -> FloatArray:

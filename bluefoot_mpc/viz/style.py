@@ -47,6 +47,23 @@ GUIDED_NAMES: dict[str, str] = {
     "blind": "blind",
 }
 
+PHASE_COLOURS: dict[str, str] = {
+    "sweep": "#6b5bd2",
+    "think": "#d99a00",
+    "walk": "#1283d2",
+    "arrived": "#12a17c",
+    "blocked": "#d1495b",
+}
+"""One colour for each phase of crossing rough ground."""
+
+PHASE_NAMES: dict[str, str] = {
+    "sweep": "sweep",
+    "think": "think",
+    "walk": "walk",
+    "arrived": "arrived",
+    "blocked": "blocked",
+}
+
 GOOD = "#12a17c"
 WARNING = "#d99a00"
 BAD = "#d1495b"
@@ -60,6 +77,8 @@ COMMAND = "#e07020"
 ZMP = "#d1495b"
 COM = "#6b5bd2"
 SUPPORT = "#12a17c"
+ROUTE = "#e61a8c"
+"""A planned way over rough ground, where no marker is."""
 LEADER = "#8a6d1f"
 MARKER = "#e61a8c"
 """The marker's own colour, which no leg wears."""

@@ -1,0 +1,208 @@
+"""The report's figures of crossing rough ground: phases over time, and the ground under the feet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bluefoot_mpc.types import LEGS, FloatArray
+from bluefoot_mpc.viz.crossing_series import CrossingSeries
+from bluefoot_mpc.viz.crossing_truth import Profile
+from bluefoot_mpc.viz.packing import pack, stretches, stride_for
+from bluefoot_mpc.viz.plots import LIMIT, Panel, Trace, curve, name_rows
+from bluefoot_mpc.viz.plots_way import smoothed
+from bluefoot_mpc.viz.series import RunSeries
+from bluefoot_mpc.viz.style import (
+    COMMAND,
+    ESTIMATE,
+    LEG_COLOURS,
+    LEG_NAMES,
+    PHASE_COLOURS,
+    PHASE_NAMES,
+)
+
+_MEAN = 1.2
+"""s over which achieved speed is averaged: a cycle of the walk."""
+_ROWS = (("", (0.965, 1.0)), ("pitch (°)", (0.72, 0.93)), ("speed (mm/s)", (0.47, 0.67)),
+         ("step height (mm)", (0.235, 0.42)), ("to the goal (m)", (0.0, 0.185)))  # fmt: skip
+
+
+def phases_over_time(series: RunSeries, crossing: CrossingSeries, period: float) -> Panel:
+    """What the robot was at, its pitch, speed and step heights, and how far the goal was."""
+    traces = [*_bands(crossing, period), *_pitch(crossing), *_speed(series, crossing, period)]
+    for leg, name in enumerate(LEGS):
+        if np.isfinite(crossing.lift[:, leg]).any():
+            trace = curve(crossing.time, 1e3 * crossing.lift[:, leg], name, LEG_COLOURS[name], axis="y4")
+            traces.append(trace)
+    traces += _distance(crossing)
+    layout: dict[str, Any] = {
+        "yaxis" if k == 0 else f"yaxis{k + 1}": {
+            "domain": list(domain),
+            "title": {"text": title, "font": {"size": 11}},
+        }
+        for k, (title, domain) in enumerate(_ROWS)
+    }
+    layout["yaxis"] |= {"range": [-0.5, 0.5], "fixedrange": True, "showgrid": False, "showticklabels": False}
+    layout["yaxis5"]["rangemode"] = "tozero"
+    layout["xaxis"] = {"title": {"text": "time (s)"}, "anchor": "y5"}
+    return Panel(
+        key="crossing", title="Crossing", data=traces, layout=layout, height=640, wide=True,
+        caption=_caption(crossing),
+    )  # fmt: skip
+
+
+def side_view(profiles: Sequence[Profile]) -> Panel:
+    """Ground and feet from the side, along the way of each foot."""
+    traces: list[Trace] = []
+    layout = _side_rows(len(profiles))
+    names = []
+    for row, profile in enumerate(profiles):
+        axis = "y" if row == 0 else f"y{row + 1}"
+        low, high = _heights(profiles)
+        layout["yaxis" if row == 0 else f"yaxis{row + 1}"]["range"] = [low, high]
+        traces += _profile_traces(profile, axis, low, first=row == 0)
+        least = f", least {1e3 * profile.least:.0f} mm over it" if np.isfinite(profile.least) else ""
+        names.append(f"{LEG_NAMES[LEGS[profile.leg]]}{least}")
+    name_rows(layout, names, [LEG_COLOURS[LEGS[profile.leg]] for profile in profiles])
+    truth = any(np.isfinite(profile.true).any() for profile in profiles)
+    ground = "the ground as it is (brown) and as mapped (blue)" if truth else "the ground as mapped"
+    return Panel(
+        key="side", title="Feet over the ground", data=traces, layout=layout, height=780, wide=True,
+        time=False,
+        caption=f"Lowest point of each foot along its own way, and {ground} under it, by the map in force at "
+        "the time. Heights are stretched. Least height over the ground: in the middle half of the swings.",
+    )  # fmt: skip
+
+
+def _bands(crossing: CrossingSeries, period: float) -> list[Trace]:
+    """What the robot was at, as coloured bars."""
+    at = np.array(crossing.phase)
+    traces: list[Trace] = []
+    for name, colour in PHASE_COLOURS.items():
+        spans = stretches(at == name, crossing.time, period)
+        if not spans:
+            continue
+        x = [value for start, end in spans for value in (start, end, np.nan)]
+        lasted = sum(end - start for start, end in spans)
+        traces.append(
+            {
+                "type": "scatter", "mode": "lines", "x": pack(x), "y": pack([0.0] * len(x)),
+                "name": f"{PHASE_NAMES[name]}, {lasted:.1f} s", "line": {"color": colour, "width": 16},
+                "hoverinfo": "name",
+            }
+        )  # fmt: skip
+    return traces
+
+
+def _pitch(crossing: CrossingSeries) -> list[Trace]:
+    lines = [("wanted", crossing.pitch, COMMAND, "solid"),
+             ("estimate", crossing.pitch_estimate, ESTIMATE, "solid")]  # fmt: skip
+    if crossing.has_truth:
+        lines.append(("truth", crossing.pitch_truth, "@ink", "dot"))
+    return [
+        curve(crossing.time, np.degrees(values), name, colour, axis="y2", dash=dash, width=1.5)
+        for name, values, colour, dash in lines
+        if np.isfinite(values).any()
+    ]
+
+
+def _speed(series: RunSeries, crossing: CrossingSeries, period: float) -> list[Trace]:
+    speed = series.velocity_truth if series.has_truth else series.velocity_estimate
+    count = max(1, round(_MEAN / period))
+    allowed = curve(crossing.time, 1e3 * crossing.speed, "allowed", COMMAND, axis="y3", width=1.6)
+    name = f"achieved (mean of {_MEAN:g} s)"
+    return [
+        curve(crossing.time, 1e3 * smoothed(speed[:, 0], count), name, "@ink", axis="y3", width=1.3),
+        {**allowed, "line": {**allowed["line"], "shape": "hv"}},
+    ]
+
+
+def _distance(crossing: CrossingSeries) -> list[Trace]:
+    if not np.isfinite(crossing.goal).all():
+        return []
+    ways = [("distance, estimate" if crossing.has_truth else "distance", crossing.estimate, ESTIMATE)]
+    if crossing.has_truth:
+        ways.insert(0, ("distance, truth", crossing.position, "@ink"))
+    return [
+        curve(crossing.time, np.hypot(*(way[:, :2] - crossing.goal).T), name, colour, axis="y5", width=1.5)
+        for name, way, colour in ways
+    ]
+
+
+def _caption(crossing: CrossingSeries) -> str:
+    said = []
+    blocked = [k for k, name in enumerate(crossing.phase) if name == "blocked"]
+    if blocked:
+        reason = next((crossing.reason[k] for k in blocked if crossing.reason[k]), "no reason given")
+        said.append(f"Blocked at {crossing.time[blocked[0]]:.1f} s: {reason}.")
+    known = crossing.drift[np.isfinite(crossing.drift)]
+    moved = f", which corrected older maps by up to {1e3 * known.max():.0f} mm" if known.any() else ""
+    said.append(f"{crossing.sweeps} sweep{'' if crossing.sweeps == 1 else 's'}{moved}.")
+    return f"{' '.join(said)} Pitch: nose down is positive. Speed allowed by the difficulty of the ground."
+
+
+def _side_rows(count: int) -> dict[str, Any]:
+    gap = 0.075
+    share = (1.0 - gap * (count - 1)) / count
+    layout: dict[str, Any] = {}
+    for row in range(count):
+        top = 1.0 - row * (share + gap)
+        layout["yaxis" if row == 0 else f"yaxis{row + 1}"] = {
+            "domain": [max(0.0, top - share), top],
+            "title": {"text": "height (mm)", "font": {"size": 11}},
+        }
+    anchor = "y" if count == 1 else f"y{count}"
+    layout["xaxis"] = {"title": {"text": "x, forward at the start (m)"}, "anchor": anchor}
+    layout["hovermode"] = "closest"
+    return layout
+
+
+def _heights(profiles: Sequence[Profile]) -> tuple[float, float]:
+    """Millimetres that all rows show; without what is rare."""
+    pieces = [values for p in profiles for values in (p.true, p.foot[:, 1])]
+    table = 1e3 * np.concatenate(pieces)
+    table = table[np.isfinite(table)]
+    if not len(table):
+        return -10.0, 40.0
+    low, high = np.percentile(table, [0.2, 99.8]).tolist()
+    return min(low, 0.0) - 8.0, max(high, 20.0) + 8.0
+
+
+def _profile_traces(profile: Profile, axis: str, low: float, *, first: bool) -> list[Trace]:
+    traces: list[Trace] = []
+    if np.isfinite(profile.true).any():
+        x, true = _ordered(profile.ground_x, profile.true)
+        # The ground is filled down to the figure's edge: zero may be above it.
+        edge = _side(x[[0, -1]], np.full(2, low / 1e3), "edge", "rgba(0,0,0,0)", axis, 0.0)
+        traces += [
+            {**edge, "showlegend": False, "hoverinfo": "skip"},
+            {**_side(x, np.maximum(true, low / 1e3), "ground", "#8a6d4a", axis, 1.4), "fill": "tonexty",
+             "fillcolor": "rgba(154,122,82,0.20)", "legendgroup": "ground", "showlegend": first},
+        ]  # fmt: skip
+    if np.isfinite(profile.mapped).any():
+        x, mapped = _ordered(profile.ground_x, profile.mapped)
+        traces.append({**_side(x, mapped, "map", ESTIMATE, axis, 1.3), "legendgroup": "map",
+                       "showlegend": first})  # fmt: skip
+    name = LEGS[profile.leg]
+    pick = slice(None, None, stride_for(len(profile.time), 2 * LIMIT))
+    times, foot = profile.time[pick], profile.foot[pick]
+    trace = _side(foot[:, 0], foot[:, 1], name, LEG_COLOURS[name], axis, 1.6)
+    trace["customdata"] = pack(times[:, None])
+    trace["hovertemplate"] = "%{customdata[0]:.1f} s<br>x %{x:.3f} m, %{y:.0f} mm<extra></extra>"
+    return [*traces, {**trace, "showlegend": False}]
+
+
+def _ordered(x: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Samples in the order of x: a foot that slips back would draw the ground twice."""
+    order = np.argsort(x, kind="stable")
+    return x[order], z[order]
+
+
+def _side(x: FloatArray, z: FloatArray, name: str, colour: str, axis: str, width: float) -> Trace:
+    return {
+        "type": "scatter", "mode": "lines", "x": pack(x), "y": pack(1e3 * z), "name": name, "yaxis": axis,
+        "line": {"color": colour, "width": width},
+        "hovertemplate": f"{name}<br>x %{{x:.3f}} m, %{{y:.0f}} mm<extra></extra>",
+    }  # fmt: skip
