@@ -18,6 +18,7 @@ from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.leveling.config import LevelingConfig
 from bluefoot_mpc.model.legs.ankle import AnkleConfig
 from bluefoot_mpc.navigation.config import NavigationConfig
+from bluefoot_mpc.navigation.crossing.config import CrossingConfig
 from bluefoot_mpc.zmp.placement import PlacementConfig
 from bluefoot_mpc.zmp.preview import PreviewConfig
 
@@ -34,6 +35,7 @@ class ControlConfig:
     zmp: PlacementConfig = field(default_factory=PlacementConfig)
     preview: PreviewConfig = field(default_factory=PreviewConfig)
     navigation: NavigationConfig = field(default_factory=NavigationConfig)
+    crossing: CrossingConfig = field(default_factory=CrossingConfig)
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
     ground: GroundAdaptationConfig = field(default_factory=GroundAdaptationConfig)
     placer: PlacerConfig = field(default_factory=PlacerConfig)

@@ -34,9 +34,11 @@ from bluefoot_mpc.gait.gait import Gait, GaitInputs, GaitOutput, Style
 from bluefoot_mpc.geometry import rotation_from_rpy
 from bluefoot_mpc.leveling.narx import NarxWeights
 from bluefoot_mpc.model.robot import RobotModel
+from bluefoot_mpc.navigation.crossing.crosser import FeetState
 from bluefoot_mpc.types import (
     N_JOINTS,
     BodyState,
+    CrossingReport,
     FloatArray,
     JointCommand,
     LevelReport,
@@ -85,7 +87,7 @@ class Pipeline:
         self._body = PlannedBody(robot.parameters.servo)
         self._planner = BodyPlanner(robot, config.whole_body) if config.whole_body.enabled else None
         self._ground = GroundAdapter(config.ground)
-        self._guidance = Guidance(config.navigation, robot.parameters.sensors)
+        self._guidance = Guidance(config.navigation, config.crossing, robot.parameters)
         self._placer = FootPlacer(geometry, config.placer)
         self._recovery = PushRecovery(config.push_recovery)
         self._step_back = plans.StepBack()
@@ -150,7 +152,10 @@ class Pipeline:
         urgent = plans.more_urgent(safety or SafetyRequest(), own)
         changed = self._advance_mode(urgent, float(upright[2, 2]))
         walks = self._walks(estimate)
-        guided, navigation, found = self._guidance.step(self._wanted, frame, estimate, walks=walks, dt=dt)
+        fared = FeetState(resting=not self._walking, waiting=self._placer.waiting)
+        guided, navigation, found = self._guidance.step(
+            self._wanted, frame, estimate, walks=walks, dt=dt, feet=fared
+        )
         motion = self._in_force(guided, walks)
         if self._placer.pace < 1.0:  # feet wait for good ground
             pace = self._placer.pace
@@ -176,7 +181,7 @@ class Pipeline:
         telemetry = Telemetry(
             time=frame.time, mode=self._modes.mode, motion=motion, estimate=estimate, phase=gait.phase,
             reference=reference, zmp=zmp, events=begun + found + held + cut + changed + leveling,
-            plan=planned, level=level, navigation=navigation,
+            plan=planned, level=level, navigation=navigation, crossing=self._crossing(),
         )  # fmt: skip
         return ControlOutput(command=command, telemetry=telemetry)
 
@@ -323,6 +328,13 @@ class Pipeline:
     def _within_limits(self, goals: FloatArray) -> FloatArray:
         geometry = self._robot.geometry
         return np.minimum(np.maximum(goals, geometry.physical_lower), geometry.physical_upper)
+
+    def _crossing(self) -> CrossingReport | None:
+        """What was decided on rough ground, footholds too."""
+        report = self._guidance.crossing
+        if report is None:
+            return None
+        return replace(report, footholds=self._placer.footholds.copy(), lift=self._placer.lift.copy())
 
     def _voltage(self, frame: SensorFrame) -> float:
         servo = self._robot.parameters.servo

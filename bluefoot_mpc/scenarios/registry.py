@@ -9,6 +9,7 @@ from pathlib import Path
 
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.scenarios.base import Scenario, ScenarioConfig
+from bluefoot_mpc.scenarios.crossing import Rough
 from bluefoot_mpc.scenarios.leveling import Level
 from bluefoot_mpc.scenarios.navigating import Goto, Wander
 from bluefoot_mpc.scenarios.posing import Pose, Stand
@@ -30,6 +31,7 @@ SHIPPED: dict[str, type[Scenario]] = {
         Goto,
         Approach,
         Follow,
+        Rough,
         Remote,
     )
 }

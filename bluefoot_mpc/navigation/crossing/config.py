@@ -1,0 +1,61 @@
+"""Everything that shapes how rough ground is crossed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from bluefoot_mpc.navigation.crossing.follower import FollowerConfig
+from bluefoot_mpc.navigation.crossing.pace import PaceConfig
+from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
+from bluefoot_mpc.terrain.cloud import CloudConfig
+from bluefoot_mpc.terrain.ground import RatingConfig
+from bluefoot_mpc.terrain.height_map import MapConfig
+from bluefoot_mpc.terrain.merge import MergeConfig
+from bluefoot_mpc.terrain.plan import PlanConfig
+from bluefoot_mpc.terrain.registration import Bounds
+from bluefoot_mpc.terrain.sweep import SweepConfig
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class CrossingConfig:
+    """Configuration of each part, and of what ties them together."""
+
+    sweep: SweepConfig = field(default_factory=SweepConfig)
+    cloud: CloudConfig = field(default_factory=CloudConfig)
+    map: MapConfig = field(default_factory=MapConfig)
+    merge: MergeConfig = field(default_factory=MergeConfig)
+    align: Bounds = field(default_factory=Bounds)
+    rating: RatingConfig = field(default_factory=RatingConfig)
+    plan: PlanConfig = field(default_factory=lambda: PlanConfig(even_radius=0.0))
+    pace: PaceConfig = field(default_factory=PaceConfig)
+    follower: FollowerConfig = field(default_factory=FollowerConfig)
+    start_radius: float = 0.45  # m around the feet at the start, within which the ground is taken to be even
+    start_confidence: float = 0.3  # in that ground
+    ahead: float = 1.6  # m, of the map, ahead of the robot
+    behind: float = 0.7  # m
+    aside: float = 0.8  # m to either side
+    stretch: float = 0.45  # m that are walked from one sweep to the next
+    settle_time: float = 0.3  # s for which all feet rest before a sweep
+    think_ticks: int = 20  # command periods for mapping and planning
+    patience: float = 3.0  # s that a foot may have nowhere to step before the robot looks again
+    attempts: int = 3  # fruitless sweeps in a row after which it stays
+    progress: float = 0.05  # m that count as fruit
+    incremental: bool = False  # map while walking, rather than stop and sweep
+    rethink_time: float = 1.5  # s between two plans on the way, then
+    walking_pitch_deg: float = 18.0  # degrees nose down in the mean, then
+    walking_swing_deg: float = 4.0  # degrees to either side of it
+    walking_period: float = 3.0  # s of that
+
+    def __post_init__(self) -> None:
+        require_nonnegative(
+            start_radius=self.start_radius, settle_time=self.settle_time, patience=self.patience,
+            progress=self.progress, walking_swing_deg=self.walking_swing_deg,
+        )  # fmt: skip
+        require_positive(
+            ahead=self.ahead, behind=self.behind, aside=self.aside, stretch=self.stretch,
+            rethink_time=self.rethink_time, walking_period=self.walking_period,
+        )  # fmt: skip
+        require_range(0.0, 1.0, start_confidence=self.start_confidence)
+        require_range(0.0, 31.0, walking_pitch_deg=self.walking_pitch_deg)
+        require_range(1, 500, think_ticks=self.think_ticks)
+        require_range(1, 100, attempts=self.attempts)

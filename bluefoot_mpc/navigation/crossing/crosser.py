@@ -1,0 +1,284 @@
+"""How rough ground is crossed: sweep it, map it, plan a way, walk it, sweep again until the goal line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from bluefoot_mpc.geometry import rotation_from_quaternion
+from bluefoot_mpc.model.parameters import RobotParameters
+from bluefoot_mpc.navigation.crossing.config import CrossingConfig
+from bluefoot_mpc.navigation.crossing.follower import FeetCentre, Steering, steer
+from bluefoot_mpc.navigation.crossing.mapper import Mapper, Thought
+from bluefoot_mpc.navigation.crossing.sweeper import Sweeper
+from bluefoot_mpc.navigation.crossing.thinker import Thinker
+from bluefoot_mpc.terrain.ground import Ground
+from bluefoot_mpc.types import (
+    BodyState,
+    CrossingPhase,
+    CrossingReport,
+    FloatArray,
+    Guide,
+    GuideTask,
+    SensorFrame,
+    TrunkPose,
+)
+
+_STILL = np.zeros(2)
+_NOTHING = np.zeros((0, 3))
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class CrossingDecision:
+    """What the crossing wants of the controller on this tick.
+
+    Attributes:
+        velocity: (2,) m/s, forward and left in the heading frame.
+        yaw_rate: rad/s, left positive.
+        trunk: wanted offset of the trunk.
+        report: what it saw and why.
+    """
+
+    velocity: FloatArray
+    yaw_rate: float
+    trunk: TrunkPose
+    report: CrossingReport
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class FeetState:
+    """How the feet fare, as of the previous tick.
+
+    Attributes:
+        resting: the gait rests, all feet stand.
+        waiting: why a foot has nowhere to step; empty while all have.
+    """
+
+    resting: bool
+    waiting: str = ""
+
+
+class _Stage(StrEnum):
+    """What goes on within a phase."""
+
+    SETTLE = "settle"
+    LOOK = "look"
+    THINK = "think"
+    WALK = "walk"
+    STAY = "stay"
+
+
+class Crosser:
+    """Crosses rough ground, or only looks at it.
+
+    Attributes:
+        ground: what to step on; None before the first map.
+
+    Args:
+        config: of each part.
+        robot: where the LIDAR is, and how thick the feet are.
+    """
+
+    def __init__(self, config: CrossingConfig, robot: RobotParameters) -> None:
+        self._config = config
+        self._sweeper = Sweeper(config.sweep, robot.sensors, config.cloud)
+        self._mapper = Mapper(config, robot)
+        self._thinker: Thinker[Thought] = Thinker(config.think_ticks)
+        self._centre = FeetCentre(config.follower.smoothing)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the state after ``__init__``, bit for bit."""
+        self._mapper.reset()
+        self.ground: Ground | None = None
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget the task, not the ground: what comes next is a new one."""
+        self._sweeper.reset()
+        self._thinker.reset()
+        self._centre.reset()
+        self._mapper.forget_start()
+        self._stage = _Stage.SETTLE
+        self._thought: Thought | None = None
+        self._origin: FloatArray | None = None
+        self._place = _STILL
+        self._furthest = 0.0
+        self._fruitless = 0
+        self._sweeps = 0
+        self._stood = self._waited = self._since_thought = 0.0
+        self._reason = ""
+        self._arrived = False
+
+    def step(
+        self, guide: Guide, frame: SensorFrame, estimate: BodyState, feet: FeetState, dt: float
+    ) -> CrossingDecision:
+        """One tick.
+
+        Args:
+            guide: the task, ``cross`` or ``sweep``.
+            frame: newest sensor frame.
+            estimate: estimated state of the robot.
+            feet: how the feet fared on the last tick.
+            dt: s.
+        """
+        places = foot_places(estimate)
+        self._place = self._centre.step(places, dt)
+        if self._origin is None:
+            self._origin = self._place
+        if self._stage is _Stage.SETTLE:
+            return self._settle(feet, places, estimate, dt)
+        if self._stage is _Stage.LOOK:
+            return self._look(guide, frame, estimate, dt)
+        if self._stage is _Stage.THINK:
+            return self._think(guide)
+        if self._stage is _Stage.WALK:
+            return self._walk(guide, frame, estimate, feet, dt)
+        return self._stand(CrossingPhase.ARRIVED if self._arrived else CrossingPhase.BLOCKED)
+
+    def _settle(
+        self, feet: FeetState, places: FloatArray, estimate: BodyState, dt: float
+    ) -> CrossingDecision:
+        """Stand until all feet rest, then begin to sweep."""
+        self._stood = self._stood + dt if feet.resting else 0.0
+        if self._stood >= self._config.settle_time:
+            self._mapper.stand_on(places, estimate.time)
+            self._mapper.begin_sweep()
+            self._sweeper.begin(estimate.time)
+            self._stage = _Stage.LOOK
+        return self._stand(CrossingPhase.SWEEP)
+
+    def _look(self, guide: Guide, frame: SensorFrame, estimate: BodyState, dt: float) -> CrossingDecision:
+        """Sweep; afterwards think about what was seen."""
+        seen = self._sweeper.step(frame, estimate, dt)
+        self._mapper.add(seen.points, estimate)
+        decision = self._stand(CrossingPhase.SWEEP, trunk=seen.trunk, points=seen.points, level=seen.level)
+        if seen.done:
+            self._sweeps += 1
+            self._reason = seen.reason
+            self._stage = _Stage.THINK
+            self._thinker.start(self._mapper.thinking(self._pose(estimate), self._goal(guide)))
+        return decision
+
+    def _think(self, guide: Guide) -> CrossingDecision:
+        """Stand until the way is planned."""
+        thought = self._thinker.step()
+        if thought is None:
+            return self._stand(CrossingPhase.THINK)
+        self._take(thought)
+        if guide.task is GuideTask.SWEEP:
+            self._stage, self._arrived = _Stage.STAY, True
+            return self._stand(CrossingPhase.ARRIVED, thought=thought)
+        self._reason = self._reason or thought.route.reason
+        if len(thought.route.poses) > 1:
+            self._stage, self._waited, self._since_thought = _Stage.WALK, 0.0, 0.0
+        else:
+            self._fail(thought.route.reason or "no way was found")
+        return self._stand(CrossingPhase.THINK, thought=thought)
+
+    def _walk(
+        self, guide: Guide, frame: SensorFrame, estimate: BodyState, feet: FeetState, dt: float
+    ) -> CrossingDecision:
+        """Follow the way until its end, the goal line, or a place where no foot can step."""
+        goal = self._goal(guide)
+        thought, points = self._looked_on_the_way(frame, estimate, goal, dt)
+        steering = self._steer(guide, estimate)
+        self._waited = self._waited + dt if feet.waiting else 0.0
+        if self._left(goal) <= 0.0:
+            self._stage, self._arrived, self._reason = _Stage.STAY, True, ""
+        elif steering.left == 0.0:
+            self._sweep_again()
+        elif self._waited > self._config.patience:
+            self._fail(feet.waiting)
+        report = self._report(CrossingPhase.WALK, points=points, thought=thought)
+        trunk = self._mapper.trunk_on_the_way(estimate.time)
+        report = replace(report, speed=float(np.hypot(*steering.velocity)), pitch=float(trunk.rpy[1]))
+        return CrossingDecision(
+            velocity=steering.velocity, yaw_rate=steering.yaw_rate, trunk=trunk, report=report
+        )
+
+    def _looked_on_the_way(
+        self, frame: SensorFrame, estimate: BodyState, goal: FloatArray, dt: float
+    ) -> tuple[Thought | None, FloatArray]:
+        """Map and plan while walking, where that is wanted: what was newly thought, and what was seen."""
+        if not self._config.incremental:
+            return None, _NOTHING
+        points = self._mapper.look(frame, estimate)
+        thought = self._thinker.step()
+        if thought is not None and len(thought.route.poses) > 1:
+            self._take(thought)
+        self._since_thought += dt
+        if self._since_thought >= self._config.rethink_time and not self._thinker.busy:
+            self._since_thought = 0.0
+            self._thinker.start(self._mapper.thinking(self._pose(estimate), goal))
+        return thought, points
+
+    def _take(self, thought: Thought) -> None:
+        self._thought, self.ground = thought, thought.ground
+        self._mapper.take(thought)
+
+    def _steer(self, guide: Guide, estimate: BodyState) -> Steering:
+        thought, config = self._thought, self._config.follower
+        if thought is None:
+            return Steering(_STILL, 0.0, 0.0)
+        route = thought.route.poses
+        nearest = int(np.argmin(np.hypot(*(route[:, :2] - self._place).T)))
+        speed = guide.speed * float(thought.pace[nearest])
+        return steer(route, self._place, float(estimate.rpy[2]), speed, config)
+
+    def _sweep_again(self) -> None:
+        self._stage, self._stood = _Stage.SETTLE, 0.0
+
+    def _fail(self, reason: str) -> None:
+        """Nothing came of it: look again, and after some times stay."""
+        self._reason = reason
+        progress = float(np.hypot(*(self._place - (self._place if self._origin is None else self._origin))))
+        if progress > self._furthest + self._config.progress:
+            self._furthest, self._fruitless = progress, 0
+        self._fruitless += 1
+        if self._fruitless >= self._config.attempts:
+            self._stage = _Stage.STAY
+        else:
+            self._sweep_again()
+
+    def _goal(self, guide: Guide) -> FloatArray:
+        """(2,) m, where to in the odometry frame; ahead where none was named."""
+        if len(guide.waypoints):
+            return np.asarray(guide.waypoints[-1], dtype=np.float64)
+        return self._place
+
+    def _left(self, goal: FloatArray) -> float:
+        """M to the line through the goal, across the way from where the task began."""
+        origin = self._place if self._origin is None else self._origin
+        way = goal - origin
+        length = float(np.hypot(*way))
+        return float((goal - self._place) @ way) / length if length > 0.0 else 0.0
+
+    def _pose(self, estimate: BodyState) -> FloatArray:
+        """(3,) m, m, rad: where the robot is over the ground, and its heading."""
+        return np.array([*self._place.tolist(), float(estimate.rpy[2])])
+
+    def _stand(
+        self, phase: CrossingPhase, *, trunk: TrunkPose | None = None, points: FloatArray = _NOTHING,
+        level: int = -1, thought: Thought | None = None,
+    ) -> CrossingDecision:  # fmt: skip
+        trunk = trunk or TrunkPose()
+        report = replace(self._report(phase, points=points, thought=thought), level=level)
+        report = replace(report, pitch=float(trunk.rpy[1]))
+        return CrossingDecision(velocity=_STILL, yaw_rate=0.0, trunk=trunk, report=report)
+
+    def _report(self, phase: CrossingPhase, *, points: FloatArray, thought: Thought | None) -> CrossingReport:
+        return CrossingReport(
+            phase=phase, points=np.round(points, 4), sweeps=self._sweeps, reason=self._reason,
+            ground=thought.ground.map if thought else None,
+            route=thought.route.poses if thought else _NOTHING,
+            drift=thought.drift if thought else 0.0,
+        )  # fmt: skip
+
+
+def foot_places(estimate: BodyState) -> FloatArray:
+    """(4, 3) m, foot points in the odometry frame."""
+    turned = estimate.foot_position_in_base @ rotation_from_quaternion(estimate.quaternion).T
+    return np.asarray(turned + estimate.position)

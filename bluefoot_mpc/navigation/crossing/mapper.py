@@ -1,0 +1,219 @@
+"""What is known of the ground, from sweep to sweep, and what is thought about it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bluefoot_mpc.model.parameters import RobotParameters
+from bluefoot_mpc.navigation.crossing.config import CrossingConfig
+from bluefoot_mpc.navigation.crossing.pace import paces
+from bluefoot_mpc.navigation.crossing.pose_track import PoseTrack
+from bluefoot_mpc.terrain.cloud import lidar_place, scan_points
+from bluefoot_mpc.terrain.frame import centres
+from bluefoot_mpc.terrain.ground import Ground, rate_ground
+from bluefoot_mpc.terrain.height_map import MapBuilder, Region
+from bluefoot_mpc.terrain.merge import Walked, merge
+from bluefoot_mpc.terrain.plan import Route, plan_route
+from bluefoot_mpc.terrain.registration import align, moved
+from bluefoot_mpc.types import BodyState, FloatArray, HeightMap, SensorFrame, TrunkPose
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Thought:
+    """What came out of thinking about the ground.
+
+    Attributes:
+        ground: the map, and how well feet stand on it.
+        route: the way.
+        pace: (k,) share of the full speed at each of its poses.
+        drift: m, by which the older map was moved sideways.
+    """
+
+    ground: Ground
+    route: Route
+    pace: FloatArray
+    drift: float
+
+
+class Mapper:
+    """Collects points, and keeps the map that they became.
+
+    Args:
+        config: of the crossing.
+        robot: where the LIDAR is, and how thick the feet are.
+    """
+
+    def __init__(self, config: CrossingConfig, robot: RobotParameters) -> None:
+        self._config, self._mounts = config, robot.sensors
+        self._foot_radius = robot.legs.foot_radius
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the ground."""
+        self._builder = MapBuilder(self._config.map)
+        self._track = PoseTrack()
+        self._known: HeightMap | None = None
+        self._place: FloatArray | None = None
+        self._stands = False
+
+    def forget_start(self) -> None:
+        """The robot may have been put elsewhere: what it stands on next is even ground again."""
+        self._stands = False
+
+    def stand_on(self, feet: FloatArray, time: float) -> None:
+        """Take the ground around standing feet to be even, the first time.
+
+        Args:
+            feet: (4, 3) m, foot points in the odometry frame.
+            time: s.
+        """
+        if self._stands:
+            return
+        self._stands = True
+        if self._config.start_radius > 0.0:
+            ground = feet - (0.0, 0.0, self._foot_radius)
+            self._known = merge(self._known, even_ground(ground, time, self._config))
+
+    def begin_sweep(self) -> None:
+        """Forget the points of the last sweep; its map stays."""
+        self._builder = MapBuilder(self._config.map)
+
+    def add(self, points: FloatArray, estimate: BodyState) -> None:
+        """Take the points of a scan in.
+
+        Args:
+            points: (k, 3) m, odometry frame.
+            estimate: of the robot's pose at about that time.
+        """
+        if len(points):
+            origin = lidar_place(estimate.position, estimate.quaternion, self._mounts)
+            self._builder.add(points, estimate.time, origin)
+
+    def look(self, frame: SensorFrame, estimate: BodyState) -> FloatArray:
+        """(k, 3) m, odometry frame, what a scan of this tick met while walking; it is taken in."""
+        if not estimate.healthy:
+            return np.zeros((0, 3))
+        self._track.add(estimate)
+        scan = frame.lidar
+        if scan is None or not scan.valid or not abs(frame.time - scan.time) < 0.3:
+            return np.zeros((0, 3))
+        pose = self._track.at(scan.time)
+        points = scan_points(scan, pose.position, pose.quaternion, self._mounts, self._config.cloud)
+        self.add(points, estimate)
+        return points
+
+    def thinking(self, pose: FloatArray, goal: FloatArray) -> Callable[[], Thought]:
+        """Work that maps what was collected and plans a way; later points are for the next one.
+
+        Args:
+            pose: (3,) m, m, rad: where the robot is, and its heading.
+            goal: (2,) m, odometry frame.
+        """
+        builder, known, place, config = self._builder, self._known, self._place, self._config
+        self._builder, self._place = MapBuilder(config.map), pose[:2]
+        way = 0.0 if place is None else float(np.hypot(*(pose[:2] - place)))
+        return lambda: think(builder, known, Walked(way=way, place=pose[:2]), Aim(pose, goal), config)
+
+    def take(self, thought: Thought) -> None:
+        """Go on from a new map."""
+        self._known = thought.ground.map
+
+    def trunk_on_the_way(self, time: float) -> TrunkPose:
+        """The trunk while walking: level, or with the nose down to look where it goes."""
+        config = self._config
+        if not config.incremental:
+            return TrunkPose()
+        swing = config.walking_swing_deg * math.sin(2.0 * math.pi * time / config.walking_period)
+        return TrunkPose(rpy=np.array([0.0, math.radians(config.walking_pitch_deg + swing), 0.0]))
+
+
+@dataclass(frozen=True, slots=True)
+class Aim:
+    """From where to where.
+
+    Attributes:
+        pose: (3,) m, m, rad: the robot.
+        goal: (2,) m.
+    """
+
+    pose: FloatArray
+    goal: FloatArray
+
+
+def think(
+    builder: MapBuilder, known: HeightMap | None, walked: Walked, aim: Aim, config: CrossingConfig
+) -> Thought:
+    """Map, put together with what was known, rate it for feet, and plan a way.
+
+    Args:
+        builder: with the newest points.
+        known: the map so far; None without one.
+        walked: since then.
+        aim: from where to where.
+        config: how.
+    """
+    fresh = builder.build(region_around(aim.pose, config))
+    drift = 0.0
+    if known is not None:
+        shift = align(known, fresh, config.align)
+        known, drift = moved(known, shift), math.hypot(shift.x, shift.y)
+    ground = rate_ground(merge(known, fresh, walked, config.merge), config.rating)
+    x, y, yaw = aim.pose.tolist()
+    goal_x, goal_y = aim.goal.tolist()
+    route = shortened(plan_route(ground.map, (x, y, yaw), (goal_x, goal_y), config.plan), config.stretch)
+    pace = paces(ground.map, route.poses, config.pace) if len(route.poses) else np.zeros(0)
+    return Thought(ground=ground, route=route, pace=pace, drift=drift)
+
+
+def region_around(pose: FloatArray, config: CrossingConfig) -> Region:
+    """The piece of ground that the map keeps: some way around the robot, more of it ahead."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    x = np.array((-config.behind, config.ahead))[:, None]
+    y = np.array((-config.aside, config.aside))[None, :]
+    across, along = c * x - s * y + pose[0], s * x + c * y + pose[1]
+    return Region.spanning(
+        (float(across.min()), float(across.max())), (float(along.min()), float(along.max())), config.map.cell
+    )
+
+
+def even_ground(under: FloatArray, time: float, config: CrossingConfig) -> HeightMap:
+    """Even ground under and around standing feet, as a map.
+
+    Args:
+        under: (4, 3) m, ground under the feet, odometry frame.
+        time: s.
+        config: how far around.
+    """
+    middle = under.mean(axis=0)
+    radius = config.start_radius
+    low, high = middle[:2] - radius, middle[:2] + radius
+    region = Region.spanning(
+        (float(low[0]), float(high[0])), (float(low[1]), float(high[1])), config.map.cell
+    )
+    empty = np.full((region.n, region.m), np.nan)
+    ground = HeightMap(
+        time=time, cell=config.map.cell, pose=region.pose, height=empty, confidence=np.zeros_like(empty)
+    )
+    slope, *_ = np.linalg.lstsq(under[:, :2] - middle[:2], under[:, 2] - middle[2], rcond=None)
+    away = centres(ground) - middle[:2]
+    near = np.hypot(away[..., 0], away[..., 1]) <= radius
+    height = middle[2] + away @ slope
+    return replace(
+        ground, height=np.where(near, height, np.nan),
+        confidence=np.where(near, config.start_confidence, 0.0),
+    )  # fmt: skip
+
+
+def shortened(route: Route, stretch: float) -> Route:
+    """The first part of a route, `stretch` m of it; a little more where that makes it whole."""
+    poses = route.poses
+    if len(poses) < 2:
+        return route
+    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))))
+    if along[-1] <= 1.2 * stretch:
+        return route
+    return replace(route, poses=poses[: int(np.searchsorted(along, stretch)) + 1], reaches_goal=False)
