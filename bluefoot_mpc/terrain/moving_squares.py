@@ -22,8 +22,8 @@ class FitConfig:
     neighbours: int = 40  # at most so many, the nearest ones
     radius: float = 0.10  # m, none beyond
     width: float = 0.05  # m, standard deviation of the Gaussian weight over distance
-    step: float = 0.006  # m, standard deviation of the weight over the distance from the plane: keeps edges
-    rounds: int = 2  # fits of the smoothing
+    step: float = 0.004  # m, standard deviation of the weight over the distance from the plane: keeps edges
+    rounds: int = 3  # fits of the smoothing
 
     def __post_init__(self) -> None:
         require_range(3, 256, neighbours=self.neighbours)
@@ -121,24 +121,28 @@ def same_face(offset: FloatArray, weight: FloatArray, normal: FloatArray, step: 
     return np.asarray(weight * np.exp(-0.5 * np.square(away / step)))
 
 
-def smooth(points: FloatArray, around: Neighbours, config: FitConfig) -> FloatArray:
-    """(n, 3) m, the points drawn along the normal onto the planes through their surroundings.
+def smooth(points: FloatArray, around: Neighbours, config: FitConfig) -> tuple[FloatArray, FloatArray]:
+    """Draws points along the normal onto the planes through their surroundings.
 
     Moving least squares of first order (thesis, chapter 6, terrain), with weights that
-    also fade off the plane, so that edges of blocks are not rounded.
+    also fade off the plane, so that edges of blocks are not rounded. The first planes are
+    level ones: on rubble a plane through all that is near would lean on every edge.
 
     Args:
         points: (n, 3) m, finite.
         around: their neighbours.
         config: of the fit.
+
+    Returns:
+        (n, 3) m, the smoothed points, and (n, 3) unit normals of the last planes.
     """
     points = np.array(points)
     normal = np.tile(UP, (len(points), 1))
     if not len(points):
-        return points
+        return points, normal.reshape(0, 3)
     for _ in range(config.rounds):
         offset = offsets(points, around)
         planes = fit_planes(offset, same_face(offset, around.weight, normal, config.step))
         normal = planes.normal
         points += np.einsum("nd,nd->n", planes.centre, normal)[:, None] * normal
-    return points
+    return points, normal

@@ -25,19 +25,19 @@ class Normals:
     curvature: FloatArray
 
 
-def normals(points: FloatArray, around: Neighbours, config: FitConfig) -> Normals:
+def normals(points: FloatArray, around: Neighbours, guess: FloatArray, config: FitConfig) -> Normals:
     """Principal component normals, pointing up (thesis, chapter 6, terrain).
 
     Args:
         points: (n, 3) m, smoothed.
         around: their neighbours.
+        guess: (n, 3) unit normals of planes off which points count less; level ones where nothing is known.
         config: of the fit.
     """
     if not len(points):
         return Normals(normal=np.zeros((0, 3)), roughness=np.zeros(0), curvature=np.zeros(0))
     offset = offsets(points, around)
-    level = np.tile(UP, (len(points), 1))
-    planes = fit_planes(offset, same_face(offset, around.weight, level, config.step))
+    planes = fit_planes(offset, same_face(offset, around.weight, guess, config.step))
     total = planes.spread.sum(axis=1)
     return Normals(
         normal=planes.normal,

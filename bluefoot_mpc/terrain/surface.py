@@ -63,8 +63,8 @@ def reconstruct(points: FloatArray, config: SurfaceConfig | None = None) -> Surf
     dense = (around.weight > 0.0).sum(axis=1) >= config.least_neighbours
     if not dense.any():
         return _empty()
-    smoothed = smooth(voxels.points, around, config.fit)
-    found = normals(smoothed, around, config.fit)
+    smoothed, guess = smooth(voxels.points, around, config.fit)
+    found = normals(smoothed, around, guess, config.fit)
     return Surface(
         points=smoothed[dense],
         normals=found.normal[dense],
