@@ -85,22 +85,30 @@ class WorldConfig:
         self._require_terrain()
 
     def _require_terrain(self) -> None:
-        """Refuse rough ground that cannot be, and figures of it that would have no effect."""
+        """Refuse rough ground that cannot be."""
         greatest = GREATEST_STONES if self.name == "stones" else GREATEST_TERRAIN
         require_range(0.0, greatest, terrain_height=self.terrain_height)
         require_range(3.0, 30.0, ramp_deg=self.ramp_deg)
         require_range(0.01, 0.30, gap=self.gap)
         require_range(0.03, 0.50, stone=self.stone)
-        for name, default, worlds in (
+
+    def require_effect(self) -> None:
+        """Refuse figures of rough ground that the world has none of; options may still change its name.
+
+        Raises:
+            ConfigurationError: one of them has no effect.
+        """
+        given = (
             ("terrain_height", 0.0, tuple(TERRAIN_HEIGHTS)),
             ("ramp_deg", 10.0, ("ramp",)),
             ("gap", 0.06, ("gap", "stones")),
             ("stone", 0.12, ("stones",)),
-        ):
+        )
+        for name, default, worlds in given:
             value = getattr(self, name)
             if value != default and self.name not in worlds:
                 raise ConfigurationError(
-                    f"{name} = {value:g} has no effect in the world '{self.name}': leave it out,"
+                    f"sim.world.{name} = {value:g} has no effect in the world '{self.name}': leave it out,"
                     f" or take one of: {', '.join(worlds)}"
                 )
 

@@ -39,8 +39,10 @@ def world_plan(config: WorldConfig, seed: int) -> WorldPlan | None:
         seed: of the run.
 
     Raises:
-        ConfigurationError: the world's file is not a plan that the robot can stand in.
+        ConfigurationError: the world's file is not a plan that the robot can stand in, or the
+            configuration has figures that mean nothing in this world.
     """
+    config.require_effect()
     layout = seed if config.layout_seed < 0 else config.layout_seed
     if config.name in TERRAIN_WORLDS:
         return terrain_plan(config, stream(layout, f"world.{config.name}"), layout)
