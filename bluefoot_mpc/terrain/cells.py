@@ -29,9 +29,9 @@ class CellConfig:
 
     estimate: Literal["upper", "maximum"] = "upper"  # corrected and trimmed, or as printed
     points: int = 2  # in a cell that counts as known, at least
-    trim: float = 0.1  # share of a cell's points that may be false, above
-    noise: float = 0.004  # m, of a height, where the LIDAR's place is not known
-    range_noise: float = 0.010  # m, standard deviation of a range (URG-04LX within 1 m)
+    trim: float = 0.2  # share of a cell's points that may be false, above
+    noise: float = 0.003  # m, of a height, where the LIDAR's place is not known
+    range_noise: float = 0.006  # m, standard deviation of an averaged range (URG-04LX within 1 m)
     tilt_noise_deg: float = 0.15  # degrees, of the trunk's estimated tilt from scan to scan
     trusted: float = 0.010  # m, standard deviation of a height with a confidence of one half
 

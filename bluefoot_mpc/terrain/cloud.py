@@ -21,9 +21,13 @@ class CloudConfig:
     least_range: float = 0.02  # m; nearer values are the sensor's error codes
     own_radius: float = 0.15  # m from the sensor; what is nearer belongs to the robot
     greatest_range: float = 2.5  # m; the height error of the tilt grows with the range
+    smooth: int = 3  # rays to either side over which ranges are averaged; 0 = none
+    same: float = 0.035  # m, by which ranges of one surface differ from their median, at most
 
     def __post_init__(self) -> None:
-        require_nonnegative(least_range=self.least_range, own_radius=self.own_radius)
+        require_nonnegative(
+            least_range=self.least_range, own_radius=self.own_radius, smooth=self.smooth, same=self.same
+        )  # fmt: skip
         require_positive(greatest_range=self.greatest_range)
         if self.greatest_range <= max(self.least_range, self.own_radius):
             raise ConfigurationError(
@@ -83,6 +87,7 @@ def scan_points(
         return np.zeros((0, 3))
     least = max(config.least_range, config.own_radius)
     # Comparisons with NaN (no echo) are false.
+    distance = smooth_ranges(np.where(distance >= config.least_range, distance, np.nan), config)
     echo = (distance >= least) & (distance <= config.greatest_range) & np.isfinite(bearing)
     distance, bearing = distance[echo], bearing[echo]
     rotation_base_to_world = rotation_from_quaternion(quaternion)
@@ -101,3 +106,30 @@ def lidar_place(position: FloatArray, quaternion: FloatArray, mount: SensorMount
         mount: where the LIDAR sits on the base.
     """
     return np.asarray(position + rotation_from_quaternion(quaternion) @ np.array(mount.lidar))
+
+
+def smooth_ranges(distance: FloatArray, config: CloudConfig) -> FloatArray:
+    """(n,) m, ranges averaged over the neighbouring rays that met the same surface; no echo stays none.
+
+    Rays are 0.35 degrees apart, 6 mm across at 1 m, and the sensor's noise there is 10 mm along the ray: a
+    mean over seven rays more than halves it, and costs 2 cm of sharpness sideways. Where the ground rises by
+    20 mm the ranges jump by 40 to 80 mm, for the rays come in flat: only ranges near the median of the
+    nearest five count, so that edges stay where they are.
+
+    Args:
+        distance: (n,) m in order of bearing; NaN where no echo came back.
+        config: how wide, and what is near.
+    """
+    if config.smooth == 0 or len(distance) == 0:
+        return distance
+    width = config.smooth
+    wide = np.pad(distance, width, constant_values=np.nan)
+    around = np.lib.stride_tricks.sliding_window_view(wide, 2 * width + 1)
+    middle = around[:, max(0, width - 2) : width + 3]
+    rising = np.sort(middle, axis=1)
+    known = np.count_nonzero(np.isfinite(middle), axis=1)
+    reference = np.take_along_axis(rising, (np.maximum(known - 1, 0) // 2)[:, None], axis=1)
+    same = np.abs(around - reference) <= config.same
+    count = np.count_nonzero(same, axis=1)
+    mean = np.where(same, around, 0.0).sum(axis=1) / np.maximum(count, 1)
+    return np.where(np.isfinite(distance), mean, np.nan)
