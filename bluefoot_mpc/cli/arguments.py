@@ -53,8 +53,9 @@ class SimulationArguments(Common):
     no_report: bool = False
     """Do not write report.html."""
     world: Annotated[str | None, _Unset] = None
-    """World by name (flat, rough, slope, steps, room, corridors, chairs, maze, dead_ends, hidden, arena), a
-    plan's file (.toml; see: bluefoot world), or an MJCF file."""
+    """World by name (flat, rough, slope, steps, room, corridors, chairs, maze, dead_ends, hidden, arena,
+    rubble, random_steps, ramp, kerb, gap, stones), a plan's file (.toml; see: bluefoot world), or an MJCF
+    file."""
     friction: Annotated[float | None, _Unset] = None
     """Friction coefficient of the floor."""
     slope: Annotated[float | None, _Unset] = None

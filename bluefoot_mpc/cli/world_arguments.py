@@ -21,9 +21,14 @@ class WorldCommand(Common):
     """Make a world from a kind and a seed, or check one from a file; draw it from above."""
 
     kind: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="KIND", help_behavior_hint="")]
-    """room, corridors, chairs, maze, dead_ends, hidden or arena; or a plan's file (.toml)."""
+    """room, corridors, chairs, maze, dead_ends, hidden or arena; rubble, random_steps, ramp, kerb, gap or
+    stones; or a plan's file (.toml)."""
     seed: int = 0
     """Seed of the layout; the same seed gives the same world."""
+    set: Annotated[
+        tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="SIM.WORLD.KEY=VALUE")
+    ] = ()
+    """One value of the world's configuration, as for a run: sim.world.terrain_height=0.03."""
     out: Annotated[Path | None, _File] = None
     """Write the plan into this TOML file, to change it and to run in it (--world FILE)."""
     picture: Annotated[Path | None, _File] = None

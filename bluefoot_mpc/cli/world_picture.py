@@ -20,8 +20,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _HALF_SECTOR = math.radians(119.9)
-_ROBOT = np.array([[0.19, 0.19], [-0.19, 0.19], [-0.19, -0.19], [0.19, -0.19]])
-_NOSE = np.array([[0.30, 0.0], [0.19, 0.07], [0.19, -0.07]])
+ROBOT_SHAPES = (
+    np.array([[0.19, 0.19], [-0.19, 0.19], [-0.19, -0.19], [0.19, -0.19]]),
+    np.array([[0.30, 0.0], [0.19, 0.07], [0.19, -0.07]]),
+)
+"""(k, 2) m each: the robot at its start from above, and its nose."""
+
 _SEEN, _UNSEEN, _OUT_OF_REACH = (0.99, 0.96, 0.83), (0.93, 0.95, 0.97), (0.82, 0.84, 0.87)
 _FLOORS = {
     "seen from the start": _SEEN,
@@ -117,7 +121,7 @@ def _draw_solid(axes: Axes, solid: Solid) -> None:
 def _draw_start_and_marker(axes: Axes, plan: WorldPlan) -> None:
     from matplotlib.patches import Circle, Polygon  # noqa: PLC0415
 
-    for shape in (_ROBOT, _NOSE):
+    for shape in ROBOT_SHAPES:
         axes.add_patch(Polygon(shape, facecolor=ESTIMATE, edgecolor="none", zorder=3))
     if (marker := plan.marker) is not None:
         at = (marker.x, marker.y)
@@ -142,8 +146,7 @@ def _page(plan: WorldPlan, grid: Grid) -> str:
         floor,
         *solid_traces(plan.solids),
         _names(plan),
-        _filled(_ROBOT),
-        _filled(_NOSE),
+        *(filled(shape) for shape in ROBOT_SHAPES),
     ]
     layout = {
         "title": {"text": title(plan, grid)}, "plot_bgcolor": "white", "hovermode": "closest",
@@ -174,7 +177,8 @@ def _names(plan: WorldPlan) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _filled(shape: FloatArray) -> dict[str, Any]:
+def filled(shape: FloatArray) -> dict[str, Any]:
+    """A polygon (k, 2), m, in the robot's colour, as a page draws it."""
     closed = np.concatenate([shape, shape[:1]])
     return {
         "type": "scatter", "mode": "lines", "fill": "toself", "x": closed[:, 0].tolist(),

@@ -19,8 +19,9 @@ DEPTH = 0.08
 STONES_END = 1.75
 """m along x, where the last row of stepping stones ends at the latest, nearly."""
 
-_FAR = 3.0  # m along x, as far as the ground behind a kerb, a gap and stones goes on
-_BACK = -1.2  # m along x, where a platform begins behind the robot
+_FAR = 3.0  # m along x, where the world ends
+_MORE = 0.5  # m, by which platforms are longer and wider than the world, so that they fill it when turned
+_BACK = -1.6  # m along x, where a platform begins behind the robot
 _PLATE = (0.15, 0.30)  # m, sides of a terrace
 _RAMP = (0.47, 0.55)  # m along x, where a ramp begins
 _EDGE = (0.55, 0.80)  # m along x, where a kerb or a gap begins
@@ -79,17 +80,18 @@ def ramp(rng: np.random.Generator, config: WorldConfig) -> list[Solid]:
 def kerb(rng: np.random.Generator, config: WorldConfig) -> list[Solid]:
     """One step up across the whole way, turned a little; the ground stays up behind it."""
     x, yaw = _front(rng, _EDGE)
-    size = (_FAR - x, 2.0 * HALF_WIDTH)
+    size = (_FAR + _MORE - x, 2.0 * HALF_WIDTH)
     return [slab("kerb", _ahead(x, yaw, 0.5 * size[0]), size, (0.0, config.relief), yaw, shade(0.5, 1.0))]
 
 
 def gap(rng: np.random.Generator, config: WorldConfig) -> list[Solid]:
     """Two platforms with a gap between them across the whole way, turned a little."""
     x, yaw = _front(rng, _EDGE)
-    before, behind = x - _BACK, _FAR - x
+    before, behind = x - _BACK, _FAR + _MORE - x
+    width = 2.0 * (HALF_WIDTH + _MORE)
     platforms = (("start", before, -0.5 * before), ("end", behind, config.gap + 0.5 * behind))
     return [
-        slab(name, _ahead(x, yaw, away), (length, 2.0 * HALF_WIDTH), (-DEPTH, 0.0), yaw, shade(0.5, 1.0))
+        slab(name, _ahead(x, yaw, away), (length, width), (-DEPTH, 0.0), yaw, shade(0.5, 1.0))
         for name, length, away in platforms
     ]
 
@@ -145,7 +147,8 @@ def terrain_plan(config: WorldConfig, rng: np.random.Generator, seed: int) -> Wo
     """
     pieces = TERRAINS[config.name](rng, config)
     floor = -DEPTH if config.name in {"gap", "stones"} else 0.0
-    farthest = max([_FAR, *(piece.x + 0.5 * piece.size[0] for piece in pieces)])
+    last = pieces[-1]
+    farthest = max(_FAR, last.x + 0.5 * last.size[0] if config.name in {"ramp", "stones"} else 0.0)
     bounds: Bounds = (-1.0, -HALF_WIDTH, round(farthest, 3), HALF_WIDTH)
     return WorldPlan(name=config.name, seed=seed, bounds=bounds, solids=tuple(pieces), floor=floor)
 
