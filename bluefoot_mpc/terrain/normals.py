@@ -16,12 +16,10 @@ class Normals:
 
     Attributes:
         normal: (n, 3) unit vectors, z not negative.
-        roughness: (n,) m, root mean square distance of the surroundings from the plane.
         curvature: (n,) 0..1/3, share of the variance along the normal: 0 on a plane.
     """
 
     normal: FloatArray
-    roughness: FloatArray
     curvature: FloatArray
 
 
@@ -35,15 +33,32 @@ def normals(points: FloatArray, around: Neighbours, guess: FloatArray, config: F
         config: of the fit.
     """
     if not len(points):
-        return Normals(normal=np.zeros((0, 3)), roughness=np.zeros(0), curvature=np.zeros(0))
+        return Normals(normal=np.zeros((0, 3)), curvature=np.zeros(0))
     offset = offsets(points, around)
     planes = fit_planes(offset, same_face(offset, around.weight, guess, config.step))
     total = planes.spread.sum(axis=1)
     return Normals(
         normal=planes.normal,
-        roughness=np.sqrt(planes.spread[:, 0]),
         curvature=planes.spread[:, 0] / np.where(total > 0.0, total, 1.0),
     )
+
+
+def roughness(measured: FloatArray, points: FloatArray, around: Neighbours, normal: FloatArray) -> FloatArray:
+    """(n,) m, how far what was measured around points strays from the planes through them, root mean square.
+
+    The sensor's noise is in it, and so are steps: neighbours count by their distance alone.
+
+    Args:
+        measured: (n, 3) m, the points before they were smoothed.
+        points: (n, 3) m, the same points smoothed.
+        around: their neighbours.
+        normal: (n, 3) unit normals of the planes.
+    """
+    total = around.weight.sum(axis=1)
+    height = -np.einsum("nd,nd->n", points, normal)[:, None]
+    away = height + sum(measured[:, axis].take(around.index) * normal[:, axis, None] for axis in range(3))
+    mean = np.einsum("nk,nk,nk->n", around.weight, away, away) / np.where(total > 0.0, total, 1.0)
+    return np.asarray(np.sqrt(mean))
 
 
 def flat(normal: FloatArray, greatest: float) -> BoolArray:

@@ -92,7 +92,7 @@ def cell_planes(height: FloatArray, cell: float, config: PatchConfig) -> tuple[F
     rise, known = np.zeros(shape), np.zeros(shape)
     for k, (di, dj) in enumerate(_AROUND):
         away = _shifted(height, di, dj) - height
-        near = np.abs(away) <= config.step * math.hypot(di, dj) if (di, dj) != (0, 0) else np.isfinite(away)
+        near = np.abs(away) <= config.step  # False at NaN
         known[k] = near
         rise[k] = np.where(near, away, 0.0)
     place = np.array(_AROUND, dtype=np.float64) * cell
@@ -132,9 +132,7 @@ def _connect(
     for di, dj in _HALF:
         other = _shifted(height, di, dj)
         rise = np.abs(other - height)
-        joined = (
-            good & (_shifted(good.astype(np.float64), di, dj) == 1.0) & (rise <= step * math.hypot(di, dj))
-        )
+        joined = good & (_shifted(good.astype(np.float64), di, dj) == 1.0) & (rise <= step)
         first = number[joined]
         ends.append((first, first + di * height.shape[1] + dj, rise[joined]))
     start, end, rises = (np.concatenate(part) for part in zip(*ends, strict=True))

@@ -8,7 +8,7 @@ import numpy as np
 
 from bluefoot_mpc.settings import require_positive, require_range
 from bluefoot_mpc.terrain.moving_squares import FitConfig, find_neighbours, smooth
-from bluefoot_mpc.terrain.normals import flat, normals
+from bluefoot_mpc.terrain.normals import flat, normals, roughness
 from bluefoot_mpc.terrain.voxels import thin
 from bluefoot_mpc.types import BoolArray, FloatArray
 
@@ -36,7 +36,7 @@ class Surface:
         points: (n, 3) m, smoothed.
         normals: (n, 3) unit vectors, z not negative.
         flat: (n,) candidates for footholds.
-        roughness: (n,) m, root mean square distance of the surroundings from their plane.
+        roughness: (n,) m, how far what was measured around them strays from their plane, root mean square.
         curvature: (n,) 0..1/3, share of the variance along the normal.
     """
 
@@ -65,11 +65,12 @@ def reconstruct(points: FloatArray, config: SurfaceConfig | None = None) -> Surf
         return _empty()
     smoothed, guess = smooth(voxels.points, around, config.fit)
     found = normals(smoothed, around, guess, config.fit)
+    rough = roughness(voxels.points, smoothed, around, found.normal)
     return Surface(
         points=smoothed[dense],
         normals=found.normal[dense],
         flat=flat(found.normal[dense], config.flatness),
-        roughness=found.roughness[dense],
+        roughness=rough[dense],
         curvature=found.curvature[dense],
     )
 
