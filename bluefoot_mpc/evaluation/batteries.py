@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bluefoot_mpc.evaluation import law_cases, level_cases, model_cases, way_cases
+from bluefoot_mpc.evaluation import ground_cases, law_cases, level_cases, model_cases, way_cases
 from bluefoot_mpc.evaluation.cases import Case
 from bluefoot_mpc.exceptions import UnknownNameError
 
@@ -24,6 +24,9 @@ BATTERIES: dict[str, Callable[[], tuple[Case, ...]]] = {
     "wander": way_cases.wander_cases,
     "approach": way_cases.approach_cases,
     "follow": way_cases.follow_cases,
+    "rough": ground_cases.crossing_cases,
+    "rough blind": ground_cases.blind_cases,
+    "rough incremental": ground_cases.incremental_cases,
 }
 """Each function gives the cases of its battery."""
 

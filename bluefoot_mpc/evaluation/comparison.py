@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import binomtest
 
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.types import FloatArray
@@ -89,6 +90,52 @@ def compare(
     return Comparison(
         figure=figure, pairs=len(pairs), left_out=len(found) - len(pairs), ratio=ratio, difference=difference
     )
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Shares:
+    """How often each of two succeeded on the same seeds.
+
+    Attributes:
+        both: seeds on which both did.
+        ours: seeds on which only ours did.
+        theirs: seeds on which only theirs did.
+        neither: seeds on which neither did.
+        difference: share of ours less share of theirs.
+        chance: probability of so uneven an outcome where both are as good (exact, McNemar).
+    """
+
+    both: int
+    ours: int
+    theirs: int
+    neither: int
+    difference: Interval
+    chance: float
+
+
+def compare_shares(ours: Mapping[int, bool], theirs: Mapping[int, bool], rng: np.random.Generator) -> Shares:
+    """Compare how often two succeed, seed by seed.
+
+    Args:
+        ours: seed to success.
+        theirs: seed to success.
+        rng: draws the resamples.
+
+    Raises:
+        ConfigurationError: the two did not run the same seeds.
+    """
+    if ours.keys() != theirs.keys() or not ours:
+        raise ConfigurationError(f"not the same seeds, or none: {sorted(ours)} and {sorted(theirs)}")
+    mine = np.array([ours[seed] for seed in sorted(ours)])
+    other = np.array([theirs[seed] for seed in sorted(ours)])
+    only_mine, only_other = int((mine & ~other).sum()), int((other & ~mine).sum())
+    uneven = only_mine + only_other
+    return Shares(
+        both=int((mine & other).sum()), ours=only_mine, theirs=only_other,
+        neither=int((~mine & ~other).sum()),
+        difference=bootstrap_mean(mine.astype(float) - other, rng),
+        chance=float(binomtest(only_mine, uneven).pvalue) if uneven else 1.0,
+    )  # fmt: skip
 
 
 def bootstrap_mean(

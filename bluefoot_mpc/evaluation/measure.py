@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from bluefoot_mpc.evaluation.cases import Case
+from bluefoot_mpc.evaluation.ground_measure import ground_figures
 from bluefoot_mpc.evaluation.level_measure import leveling_figures
 from bluefoot_mpc.evaluation.way_measure import way_figures
 from bluefoot_mpc.runtime import metrics
@@ -68,6 +69,7 @@ def measure(case: Case, seed: int) -> Figures:
         "cost_of_transport": summary["cost_of_transport"],
         **_lags(summary["figures"]),
         **way_figures(summary["figures"]),
+        **ground_figures(summary),
         **leveling_figures(summary["figures"]),
     }
 

@@ -1,0 +1,99 @@
+"""Batteries of runs over rough ground, looking where to step and blind."""
+
+from __future__ import annotations
+
+from bluefoot_mpc.evaluation.cases import Case
+from bluefoot_mpc.evaluation.limits import Limit
+
+SEEDS = tuple(range(20))
+DURATION = 130.0
+"""s for 1.5 m with all sweeps."""
+BLIND_DURATION = 62.0
+"""s for 1.5 m at 30 mm/s without any."""
+BLIND_TROT_DURATION = 35.0
+"""s for 1.5 m at 60 mm/s."""
+STEP_HEIGHTS = (0.015, 0.025, 0.035, 0.045)
+"""m, of a blind walk: the best of them counts."""
+TROT_STEP_HEIGHTS = (0.025, 0.040)
+"""m, of a blind trot."""
+ROUGHEST = 0.030
+"""m, height of the rubble over which looking must beat walking blind."""
+
+
+def crossed(count: int) -> Limit:
+    """At least `count` of 20 runs cross without a fall."""
+    return Limit(figure="crossed", bound=1.0, side="min", over="share", share=count / 20)
+
+
+MAPPED = (
+    Limit(figure="map_error_median_mm", bound=5.0, unit="mm"),
+    Limit(figure="map_error_95_mm", bound=15.0, unit="mm"),
+)
+GROUNDS: dict[str, tuple[str, tuple[str, ...], tuple[Limit, ...]]] = {
+    "rubble 20 mm": ("rubble", ("sim.world.terrain_height=0.02",), (crossed(18),)),
+    "rubble 30 mm": ("rubble", (f"sim.world.terrain_height={ROUGHEST}",), (crossed(12),)),
+    "kerb 25 mm": ("kerb", ("sim.world.terrain_height=0.025",), (crossed(18),)),
+    "stepping stones": ("stones", ("sim.world.stone=0.12", "sim.world.gap=0.06"), (crossed(15),)),
+    "random steps": ("random_steps", (), ()),
+    "ramp": ("ramp", (), ()),
+    "gap": ("gap", (), ()),
+}
+"""Name: the world, what of it is set, and what must be reached."""
+
+
+def crossing_cases(
+    controller: str = "mpc", seeds: tuple[int, ...] = SEEDS, *, incremental: bool = False
+) -> tuple[Case, ...]:
+    """To a goal line 1.5 m ahead over every kind of ground; each seed is another ground.
+
+    Args:
+        controller: what walks.
+        seeds: of ground and errors.
+        incremental: map while walking, rather than stop and sweep.
+    """
+    mode = ("scenario.incremental=true",) if incremental else ()
+    return tuple(
+        Case(
+            name=name,
+            scenario="rough",
+            options={
+                "controller": controller,
+                "world": world,
+                "duration": DURATION,
+                "overrides": (*overrides, *mode),
+            },
+            seeds=seeds,
+            limits=limits,
+        )
+        for name, (world, overrides, limits) in GROUNDS.items()
+    )
+
+
+def incremental_cases(controller: str = "mpc", seeds: tuple[int, ...] = SEEDS) -> tuple[Case, ...]:
+    """The same ground, mapped while walking; nothing is asked of it but to be measured."""
+    named = ("rubble 20 mm", "stepping stones")
+    cases = crossing_cases(controller, seeds, incremental=True)
+    return tuple(
+        Case(name=f"{c.name}, incremental", scenario=c.scenario, options=c.options, seeds=c.seeds)
+        for c in cases
+        if c.name in named
+    )
+
+
+def blind_cases(controller: str = "mpc", seeds: tuple[int, ...] = SEEDS) -> tuple[Case, ...]:
+    """The roughest rubble without looking: a walk and a trot, each with several step heights."""
+    walks = [("walk", height, 0.03, BLIND_DURATION) for height in STEP_HEIGHTS]
+    trots = [("trot", height, 0.06, BLIND_TROT_DURATION) for height in TROT_STEP_HEIGHTS]
+    return tuple(
+        Case(
+            name=f"blind {gait}, steps of {1e3 * height:.0f} mm",
+            scenario="rough",
+            options={
+                "controller": controller, "world": "rubble", "duration": duration, "gait": gait,
+                "speed": speed, "blind": True,
+                "overrides": (f"sim.world.terrain_height={ROUGHEST}", f"scenario.step_height={height}"),
+            },
+            seeds=seeds,
+        )
+        for gait, height, speed, duration in (*walks, *trots)
+    )  # fmt: skip
