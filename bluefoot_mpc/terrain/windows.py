@@ -1,19 +1,30 @@
 """The thesis' planner: greedy search in a window that slides over a cost tensor.
 
-Thesis, chapter 6, terrain, with the moves as corrected: the best cell in i +- d_w, j+1..j+d_w, u +- d_u is
-aimed at, and one step is made towards it: i += sign(i* - i), j += 1, u += sign(u* - u), with sign(0) = 0.
-Among equal cells the nearest is aimed at, so that level ground is crossed straight.
+Thesis, chapter 6, terrain, with the moves as corrected: a cell in i +- d_w, j+1..j+d_w, u +- d_u is aimed at,
+and one step is made towards it: i += sign(i* - i), j += 1, u += sign(u* - u), with sign(0) = 0. Two rules say
+which cell:
 
-The thesis' tensor has no infinite cells. Here a cell is not aimed at where the first step towards it would go
-to an infinite one; on a finite tensor that changes nothing.
+- `CELL`, the thesis': the cheapest one. What lies on the way to it is not asked.
+- `MEAN`: the one to which the moves towards it (both indices change until they fit, then straight on) cost
+  least in the mean over their cells.
+
+With a window of one cell both are the same. `MEAN` is the default: with it larger windows find cheaper ways, as
+in the thesis; docs/terrain-planning.md has the figures.
+
+Among equals the one that is least aside is aimed at, so that even ground is crossed straight. The thesis'
+tensor has no infinite cells; here a cell is not aimed at where the first step towards it would go to an
+infinite one, which changes nothing on a finite tensor.
 """
 
 from __future__ import annotations
 
+import enum
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from bluefoot_mpc.settings import require_positive
+from bluefoot_mpc.settings import require_range
 from bluefoot_mpc.terrain.lattice import Goal, Path, Start, in_goal, reached_path, short_path, whole_goal
 from bluefoot_mpc.types import FloatArray
 
@@ -21,21 +32,52 @@ WINDOWS = (1, 5, 15, 30)
 """Cells, the windows that the thesis compares."""
 
 _SIGNS = tuple((di, du) for di in (-1, 0, 1) for du in (-1, 0, 1))
-_Sides = tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]
+
+
+class Aim(enum.StrEnum):
+    """Which cell of a window is aimed at."""
+
+    CELL = "cell"
+    MEAN = "mean"
+
+
+@dataclass(frozen=True, slots=True)
+class _Window:
+    """Offsets of a window's cells, and of the cells on the way to each.
+
+    Attributes:
+        aside: (a,) in i.
+        ahead: (w,) in j.
+        turned: (b,) in u.
+        way: the (a, w, b) cells that a way to (i, last, u) passes, as indices into a tensor with a border.
+        far: (a, w, b) True where a cell is further aside than ahead, so that no way leads to it.
+    """
+
+    aside: NDArray[np.intp]
+    ahead: NDArray[np.intp]
+    turned: NDArray[np.intp]
+    way: tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]
+    far: NDArray[np.bool_]
 
 
 def search(
-    cost: FloatArray, start: Start, goal: Goal | None = None, window: int = 15, yaw_window: int = 1
+    cost: FloatArray,
+    start: Start,
+    goal: Goal | None = None,
+    window: int = 15,
+    yaw_window: int = 1,
+    aim: Aim = Aim.MEAN,
 ) -> Path:
     """The greedy way from a cell to a column.
 
     Args:
         cost: (n, m, l) costs; infinite where nobody can stand.
         start: the first cell.
-        goal: where to end; as default anywhere in the last column. The window holds only cells from which the
-            goal can still be reached in the steps that are left.
+        goal: where to end; as default anywhere in the last column. Only cells count from which it can still
+            be reached in the steps that are left.
         window: d_w, cells that the window reaches to the sides and ahead.
         yaw_window: d_u, yaw indices that it reaches to either side.
+        aim: which cell is aimed at.
 
     Returns:
         The way. Where all cells of a window are infinite, it ends there, is not `reached`, and says so.
@@ -43,13 +85,16 @@ def search(
     Raises:
         ConfigurationError: start or goal is no cell of the tensor, or a window is not positive.
     """
-    require_positive(window=window, yaw_window=yaw_window)
+    require_range(1, 10_000, window=window, yaw_window=yaw_window)
     goal = whole_goal(cost, start, goal or Goal())
     cell, cells = start, [start]
     if not np.isfinite(cost[start]):
         return short_path(np.array(cells), f"nobody can stand on the first cell {start}")
+    shape = _window(window, yaw_window)
+    border = ((window, window), (0, window), (yaw_window, yaw_window))
+    wide = np.pad(cost, border, constant_values=np.inf)
     while cell[1] != goal.j:
-        step = _step(cost, cell, goal, (window, yaw_window))
+        step = _step(wide, cell, goal, shape, aim)
         if step is None:
             return short_path(np.array(cells), f"no cell of the window at {cell} can be stepped towards")
         cell = (cell[0] + step[0], cell[1] + 1, cell[2] + step[1])
@@ -59,38 +104,64 @@ def search(
     return reached_path(cost, np.array(cells))
 
 
-def _step(cost: FloatArray, cell: Start, goal: Goal, reach: tuple[int, int]) -> tuple[int, int] | None:
-    """Signs of the step in i and u towards the best cell of the window; None where there is none."""
-    i, j, u = cell
-    n, _, turns = cost.shape
-    last = goal.j if goal.j is not None else j
-    low_i, high_i = max(i - reach[0], 0), min(i + reach[0], n - 1) + 1
-    low_u, high_u = max(u - reach[1], 0), min(u + reach[1], turns - 1) + 1
-    ahead = min(j + reach[0], last)
-    # A copy, out of which cells are struck: those beside the goal's cone, and those behind an infinite step.
-    view = cost[low_i:high_i, j + 1 : ahead + 1, low_u:high_u].copy()
-    at_i, at_j, at_u = np.arange(low_i, high_i), np.arange(j + 1, ahead + 1), np.arange(low_u, high_u)
-    _strike_outside(view, (at_i, at_j, at_u), goal)
-    side_i, side_u = np.sign(at_i - i), np.sign(at_u - u)
-    for di, du in _SIGNS:
-        if not (0 <= i + di < n and 0 <= u + du < turns and np.isfinite(cost[i + di, j + 1, u + du])):
-            behind = (side_i == di)[:, None, None] & (side_u == du)[None, None, :]
-            np.copyto(view, np.inf, where=behind)
-    best = view.min(initial=np.inf)
+def _window(window: int, yaw_window: int) -> _Window:
+    aside, turned = np.arange(-window, window + 1), np.arange(-yaw_window, yaw_window + 1)
+    ahead = np.arange(1, window + 1)
+    at_i, at_j, at_u = aside[:, None, None], ahead[None, :, None], turned[None, None, :]
+    far = (np.abs(at_i) > at_j) | (np.abs(at_u) > at_j)
+    way = (np.clip(at_i, -at_j, at_j), at_j, np.clip(at_u, -at_j, at_j))
+    return _Window(aside, ahead, turned, (way[0] + window, way[1], way[2] + yaw_window), far)
+
+
+def _step(wide: FloatArray, cell: Start, goal: Goal, window: _Window, aim: Aim) -> tuple[int, int] | None:
+    """Signs of the step in i and u towards the cell that is aimed at; None where there is none.
+
+    Args:
+        wide: the tensor in a border of infinite cells as wide as the window, but for the side it came from.
+        cell: where the way is, in the tensor without its border.
+        goal: with a column.
+        window: offsets.
+        aim: the rule.
+    """
+    view = _prices(wide, cell, window) if aim is Aim.CELL else _means(wide, cell, window)
+    _strike_outside(view, cell, goal, window)
+    best = view.min()
     if not np.isfinite(best):
         return None
     ties = np.argwhere(view == best)
-    away = np.abs(at_i[ties[:, 0]] - i) + np.abs(at_u[ties[:, 2]] - u) + at_j[ties[:, 1]] - j
-    aim = ties[int(np.argmin(away))]
-    return int(np.sign(at_i[aim[0]] - i)), int(np.sign(at_u[aim[2]] - u))
+    away = np.abs(window.aside[ties[:, 0]]) + np.abs(window.turned[ties[:, 2]])
+    aimed = ties[int(np.argmin(away))]
+    return int(np.sign(window.aside[aimed[0]])), int(np.sign(window.turned[aimed[2]]))
 
 
-def _strike_outside(view: FloatArray, sides: _Sides, goal: Goal) -> None:
+def _prices(wide: FloatArray, cell: Start, window: _Window) -> FloatArray:
+    """(a, w, b) costs of a window's cells; infinite where the first step towards them is."""
+    i, j, u = cell
+    rows, turns = slice(i, i + window.aside.size), slice(u, u + window.turned.size)
+    view = wide[rows, j + 1 : j + 1 + window.ahead.size, turns].copy()
+    middle_i, middle_u = window.aside.size // 2, window.turned.size // 2
+    for di, du in _SIGNS:
+        if not np.isfinite(view[middle_i + di, 0, middle_u + du]):
+            behind = (np.sign(window.aside) == di)[:, None] & (np.sign(window.turned) == du)[None, :]
+            view[np.broadcast_to(behind[:, None, :], view.shape)] = np.inf
+    return view
+
+
+def _means(wide: FloatArray, cell: Start, window: _Window) -> FloatArray:
+    """(a, w, b) mean costs of the ways to a window's cells; infinite where there is no such way."""
+    i, j, u = cell
+    view = np.cumsum(wide[window.way[0] + i, window.way[1] + j, window.way[2] + u], axis=1)
+    view /= window.ahead[None, :, None]
+    view[window.far] = np.inf
+    return view
+
+
+def _strike_outside(view: FloatArray, cell: Start, goal: Goal, window: _Window) -> None:
     """Make cells infinite from which the goal is out of reach: i and u change by at most one a column."""
-    at_i, at_j, at_u = sides
-    left = (goal.j if goal.j is not None else 0) - at_j
+    left = (goal.j if goal.j is not None else cell[1]) - cell[1] - window.ahead
+    view[:, left < 0] = np.inf
     if goal.i is not None:
-        view[np.abs(at_i[:, None] - goal.i) > left[None, :]] = np.inf
+        view[np.abs(window.aside[:, None] + cell[0] - goal.i) > left[None, :]] = np.inf
     if goal.u is not None:
-        aside = np.abs(at_u[None, :] - goal.u) > left[:, None]
+        aside = np.abs(window.turned[None, :] + cell[2] - goal.u) > left[:, None]
         view[np.broadcast_to(aside, view.shape)] = np.inf
