@@ -76,7 +76,7 @@ def viewer_script() -> str:
 
 def player_script() -> str:
     """The JavaScript of the replay's and the live view's own part, surroundings included."""
-    return template_text("surroundings.js") + template_text("player.js")
+    return template_text("surroundings.js") + template_text("ground.js") + template_text("player.js")
 
 
 def _node(node: Node) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from bluefoot_mpc.types import FloatArray
+from bluefoot_mpc.types import BoolArray, FloatArray
 from bluefoot_mpc.viz.crossing_series import CrossingSeries
 from bluefoot_mpc.viz.packing import pack, stride_for
 from bluefoot_mpc.viz.plots import Panel, Trace
@@ -15,6 +15,8 @@ from bluefoot_mpc.viz.style import COMMAND, ROUTE
 
 _WAY = 800
 """Most points of a way."""
+_AROUND = 0.8
+"""m around the way and the goal that are shown."""
 _STRETCH = 2.0
 """How much taller than it is a thing looks: steps of a few millimetres would not be seen."""
 _LEAST_SCALE = 20.0
@@ -23,7 +25,8 @@ _LEAST_SCALE = 20.0
 
 def cloud_picture(crossing: CrossingSeries) -> Panel:
     """All points of the run in the odometry frame, coloured by height."""
-    points = crossing.points
+    shown = _near(crossing)
+    points = crossing.points[shown]
     traces: list[Trace] = []
     if len(points):
         span = max(_LEAST_SCALE, 1e3 * float(np.percentile(np.abs(points[:, 2]), 99)))
@@ -34,7 +37,7 @@ def cloud_picture(crossing: CrossingSeries) -> Panel:
                          "outlinewidth": 0},
         }  # fmt: skip
         traces.append(
-            {**_trace(points, "markers", "cloud"), "marker": marker, "customdata": pack(crossing.point_time),
+            {**_trace(points, "markers", "cloud"), "marker": marker,
              "hovertemplate": "x %{x:.2f} m, y %{y:.2f} m, z %{z:.3f} m<extra></extra>"}
         )  # fmt: skip
     pick = slice(None, None, stride_for(len(crossing.time), _WAY))
@@ -48,23 +51,31 @@ def cloud_picture(crossing: CrossingSeries) -> Panel:
         star = np.array([[*crossing.goal, 0.0]])
         traces.append({**_trace(star, "markers", "goal"), "marker": {"size": 6, "color": COMMAND}})
     return Panel(
-        key="cloud", title="Cloud", data=traces, time=False, height=430, layout={"scene": _scene(crossing)},
-        caption=_caption(crossing),
+        key="cloud", title="Cloud", data=traces, time=False, height=440,
+        layout={"scene": _scene(crossing, points)},
+        caption=_caption(crossing, len(points)),
     )  # fmt: skip
 
 
-def _caption(crossing: CrossingSeries) -> str:
-    if not len(crossing.points):
-        return "The LIDAR gave no point of the ground: only the robot's way is shown."
-    shown = len(crossing.points)
+def _near(crossing: CrossingSeries) -> BoolArray:
+    """(m,) True for points near the way and the goal; those far aside would make the rest small."""
+    way = np.concatenate([crossing.estimate[:, :2], crossing.goal[None]])
+    low, high = np.nanmin(way, axis=0) - _AROUND, np.nanmax(way, axis=0) + _AROUND
+    places = crossing.points[:, :2]
+    return np.asarray(((places >= low) & (places <= high)).all(axis=1))
+
+
+def _caption(crossing: CrossingSeries, shown: int) -> str:
+    if not shown:
+        return "The LIDAR gave no point of the ground near the way: only the way is shown."
     part = f"{shown} of {crossing.seen} points" if shown < crossing.seen else f"{shown} points"
     return f"{part} where the robot placed them. Heights are stretched {_STRETCH:g} times. Drag to turn."
 
 
-def _scene(crossing: CrossingSeries) -> dict[str, Any]:
+def _scene(crossing: CrossingSeries, points: FloatArray) -> dict[str, Any]:
     axis = {"gridcolor": "@line", "zerolinecolor": "@line", "linecolor": "@line", "color": "@muted",
             "showbackground": False}  # fmt: skip
-    drawn = np.concatenate([crossing.points, crossing.estimate, [[*crossing.goal, np.nan]]])
+    drawn = np.concatenate([points, crossing.estimate, [[*crossing.goal, np.nan]]])
     size = np.maximum(np.nanmax(drawn, axis=0) - np.nanmin(drawn, axis=0), 0.1) * [1.0, 1.0, _STRETCH]
     # Plotly's box has sides of about one; its longest side is the longest of the drawn things.
     ratio = 1.9 * size / size.max()
@@ -74,7 +85,7 @@ def _scene(crossing: CrossingSeries) -> dict[str, Any]:
         "zaxis": {**axis, "title": {"text": "z (m)"}, "nticks": 4},
         "aspectmode": "manual",
         "aspectratio": {"x": ratio[0], "y": ratio[1], "z": ratio[2]},
-        "camera": {"eye": {"x": -1.15, "y": -1.35, "z": 0.95}, "center": {"x": 0.0, "y": 0.0, "z": -0.15}},
+        "camera": {"eye": {"x": -1.2, "y": -1.4, "z": 1.0}, "center": {"x": 0.0, "y": 0.0, "z": -0.15}},
     }
 
 

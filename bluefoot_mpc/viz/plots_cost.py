@@ -80,9 +80,9 @@ def cost_slices(crossing: CrossingSeries, config: CostConfig) -> Panel | None:
 
 
 def _headings(config: CostConfig) -> list[float]:
-    """rad: to the right, along the map and to the left; within what the planner looks at."""
+    """Headings (rad) to the left, along the map and to the right; within what the planner looks at."""
     aside = min(ASIDE, config.yaw_range)
-    return [-aside, 0.0, aside]
+    return [aside, 0.0, -aside]
 
 
 def _name(yaw: float) -> str:

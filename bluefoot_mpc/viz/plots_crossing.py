@@ -35,7 +35,8 @@ def phases_over_time(series: RunSeries, crossing: CrossingSeries, period: float)
     for leg, name in enumerate(LEGS):
         if np.isfinite(crossing.lift[:, leg]).any():
             trace = curve(crossing.time, 1e3 * crossing.lift[:, leg], name, LEG_COLOURS[name], axis="y4")
-            traces.append(trace)
+            # Legs wear their colours on the whole page.
+            traces.append({**trace, "showlegend": False})
     traces += _distance(crossing)
     layout: dict[str, Any] = {
         "yaxis" if k == 0 else f"yaxis{k + 1}": {
@@ -44,7 +45,10 @@ def phases_over_time(series: RunSeries, crossing: CrossingSeries, period: float)
         }
         for k, (title, domain) in enumerate(_ROWS)
     }
-    layout["yaxis"] |= {"range": [-0.5, 0.5], "fixedrange": True, "showgrid": False, "showticklabels": False}
+    layout["yaxis"] |= {"range": [-0.5, 0.5], "fixedrange": True, "showgrid": False, "showticklabels": False,
+                        "ticks": "", "zeroline": False}  # fmt: skip
+    lifts = crossing.lift[np.isfinite(crossing.lift)]
+    layout["yaxis4"]["range"] = [0.0, 1.15 * max(20.0, 1e3 * float(lifts.max(initial=0.0)))]
     layout["yaxis5"]["rangemode"] = "tozero"
     layout["xaxis"] = {"title": {"text": "time (s)"}, "anchor": "y5"}
     return Panel(
@@ -122,13 +126,15 @@ def _speed(series: RunSeries, crossing: CrossingSeries, period: float) -> list[T
 def _distance(crossing: CrossingSeries) -> list[Trace]:
     if not np.isfinite(crossing.goal).all():
         return []
-    ways = [("distance, estimate" if crossing.has_truth else "distance", crossing.estimate, ESTIMATE)]
+    ways = [("estimate", crossing.estimate, ESTIMATE, "solid")]
     if crossing.has_truth:
-        ways.insert(0, ("distance, truth", crossing.position, "@ink"))
-    return [
-        curve(crossing.time, np.hypot(*(way[:, :2] - crossing.goal).T), name, colour, axis="y5", width=1.5)
-        for name, way, colour in ways
-    ]
+        ways.append(("truth", crossing.position, "@ink", "dot"))
+    traces = []
+    for name, way, colour, dash in ways:
+        left = np.hypot(*(way[:, :2] - crossing.goal).T)
+        trace = curve(crossing.time, left, name, colour, axis="y5", dash=dash, width=1.5)
+        traces.append({**trace, "showlegend": False})
+    return traces
 
 
 def _caption(crossing: CrossingSeries) -> str:
@@ -140,7 +146,10 @@ def _caption(crossing: CrossingSeries) -> str:
     known = crossing.drift[np.isfinite(crossing.drift)]
     moved = f", which corrected older maps by up to {1e3 * known.max():.0f} mm" if known.any() else ""
     said.append(f"{crossing.sweeps} sweep{'' if crossing.sweeps == 1 else 's'}{moved}.")
-    return f"{' '.join(said)} Pitch: nose down is positive. Speed allowed by the difficulty of the ground."
+    return (
+        f"{' '.join(said)} Pitch: nose down is positive. Speed allowed by the difficulty of the ground. "
+        "Step heights of the next swings in the legs' colours."
+    )
 
 
 def _side_rows(count: int) -> dict[str, Any]:

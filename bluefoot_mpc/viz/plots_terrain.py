@@ -34,7 +34,7 @@ def height_map(crossing: CrossingSeries) -> Panel:
     shown = some_maps(crossing.maps)
     over = [*_ways(crossing), *_feet(crossing), *_goal(crossing)]
     low, high = extent(crossing, shown)
-    span = _span(shown)
+    span = span_of(shown)
     steps = tuple(
         Step(
             label=f"{crossing.time[entry.tick]:.1f} s",
@@ -70,7 +70,7 @@ def map_quality(crossing: CrossingSeries, errors: Sequence[MapError]) -> Panel |
     )
     return Panel(
         key="map-quality", title="Error of the map" if errors else "Confidence of the map",
-        data=steps[-1].data, time=False, height=430, steps=steps, layout=_layout(*extent(crossing, shown)),
+        data=steps[-1].data, time=False, height=400, steps=steps, layout=_layout(*_around(shown)),
         caption=_quality_caption(errors),
     )  # fmt: skip
 
@@ -158,7 +158,7 @@ def _feet(crossing: CrossingSeries) -> list[Trace]:
         swings = [swing for swing in crossing.swings if swing.leg == leg]
         chosen = [swing.chosen for swing in swings if np.isfinite(swing.chosen[:2]).all()]
         ring = {"symbol": "circle-open", "size": 10, "color": LEG_COLOURS[name], "line": {"width": 2}}
-        disc = {"symbol": "circle", "size": 5, "color": LEG_COLOURS[name]}
+        disc = {"symbol": "circle", "size": 6, "color": LEG_COLOURS[name]}
         disc["line"] = {"color": "#ffffff", "width": 0.8}
         rows = [(chosen, ring, "foothold"), ([swing.landing for swing in swings], disc, "landing")]
         for places, marker, kind in rows:
@@ -209,8 +209,8 @@ def _caption(crossing: CrossingSeries) -> str:
     )
 
 
-def _span(shown: Sequence[MapAt]) -> float:
-    """Millimetres of height, up and down, that the colours span for all maps."""
+def span_of(shown: Sequence[MapAt]) -> float:
+    """Millimetres of height, up and down, that the colours span for all of some maps."""
     heights = [np.abs(entry.ground.height + entry.ground.pose[2]).ravel() for entry in shown]
     table = 1e3 * np.concatenate([np.zeros(1), *heights])
     return max(_LEAST_SCALE, float(np.nanpercentile(table, 99.5)))
@@ -222,6 +222,11 @@ def extent(crossing: CrossingSeries, shown: Sequence[MapAt]) -> tuple[FloatArray
     pieces = [crossing.position[:, :2], crossing.feet_estimate[:, :, :2].reshape(-1, 2), crossing.goal[None]]
     points = np.concatenate([*pieces, np.reshape(corners, (-1, 2))])
     return np.nanmin(points, axis=0) - _EDGE, np.nanmax(points, axis=0) + _EDGE
+
+
+def _around(shown: Sequence[MapAt]) -> tuple[FloatArray, FloatArray]:
+    corners = np.reshape([corner for entry in shown for corner in bounds(entry.ground)], (-1, 2))
+    return corners.min(axis=0) - _EDGE, corners.max(axis=0) + _EDGE
 
 
 def _layout(low: FloatArray, high: FloatArray) -> dict[str, Any]:

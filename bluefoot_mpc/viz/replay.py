@@ -59,9 +59,9 @@ def replay_html(run: RunData, robot: RobotModel) -> str:
     """The 3D replay as a self-contained page; below it, how the robot found its way where it did."""
     series = extract(run, robot.parameters.servo.stall_torque)
     named = run.config.get("run", {})
-    data = replay_data(run, series, robot)
     journey = journey_of(run, series, robot) if len(series.time) else None
     crossing = crossing_of(run, series, robot) if len(series.time) else None
+    data = replay_data(run, series, robot, crossing.series if crossing is not None else None)
     panels = (
         *(journey.panels if journey is not None else ()),
         *(crossing.panels if crossing is not None else ()),
@@ -72,6 +72,7 @@ def replay_html(run: RunData, robot: RobotModel) -> str:
         has_truth=series.has_truth,
         has_sweeps=bool(data.get("sweeps")),
         has_room=bool(data.get("bounds")),
+        has_terrain=crossing is not None,
         plots_follow=bool(panels),
         panels=panels,
         strip=journey.strip if journey is not None else (),

@@ -68,7 +68,11 @@ def report_html(
     ]
     panels = [*ways, *panels]
     judged = verdict(summary, checks)
-    data = replay_data(run, series, robot) if has_ticks else {}
+    data = (
+        replay_data(run, series, robot, crossing.series if crossing is not None else None)
+        if has_ticks
+        else {}
+    )
     return render(
         "report.html.j2",
         title=f"{judged.word}: {summary.get('scenario') or 'run'}, seed {summary.get('seed')}",
@@ -80,6 +84,7 @@ def report_html(
         has_truth=series.has_truth,
         has_sweeps=bool(data.get("sweeps")),
         has_room=bool(data.get("bounds")),
+        has_terrain=crossing is not None,
         plots_follow=True,
         panels=panels,
         strip=journey.strip if journey is not None else (),

@@ -26,8 +26,10 @@ _LOOKS = 12
 """Sweeps that are compared with a plan."""
 _NEAR, _NOISE, _FIT = 0.06, 0.015, 0.98
 """m, m per metre of range, and share: so many points must lie so near to the plan's outlines."""
-_NOSE_DOWN, _OFF_GROUND, _GROUND_FIT = 0.15, 0.03, 0.9
-"""rad of pitch from which a sweep meets the ground; m and share: so many points must lie so near to it."""
+_NOSE_DOWN = 0.15
+"""rad of pitch from which a sweep meets the ground."""
+_OFF_GROUND, _BESIDE, _GROUND_FIT = 0.02, 0.025, 0.95
+"""m up and down, m aside, and share: so many points must lie so near to the ground of a plan."""
 _LEADER = 0.3
 """m around marker and leader, which stand in no plan."""
 CELL = 0.03
@@ -123,7 +125,10 @@ def _ground_fits(plan: WorldPlan, run: RunData, ticks: list[int], mounts: Sensor
     points = np.concatenate(found)
     if not len(points):
         return True
-    off = np.abs(points[:, 2] - Relief(plan.solids, plan.floor).height(points[:, :2]))
+    # A ray may meet the side of a thing, and then lies between its height and that of its surroundings.
+    around = _BESIDE * np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    near = Relief(plan.solids, plan.floor).height(points[:, None, :2] + around)
+    off = np.maximum(near.min(axis=1) - points[:, 2], points[:, 2] - near.max(axis=1))
     return float(np.mean(off < _OFF_GROUND)) > _GROUND_FIT
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bluefoot_mpc.geometry import rotation_from_quaternion
+from bluefoot_mpc.geometry import rotation_from_quaternion, rotation_from_rpy
 from bluefoot_mpc.sim.worlds.plan import Marker, Solid, WorldPlan
 from bluefoot_mpc.types import FloatArray
 from bluefoot_mpc.viz.scene import Command, Visual, group, transform, translation
@@ -35,10 +35,12 @@ class Stage:
     Attributes:
         plan: of the world; None draws open floor.
         leader: kind of the wheeled robot that goes ahead; empty without one.
+        foot_radius: m, from the points drawn as feet down to the ground, where that is uneven.
     """
 
     plan: WorldPlan | None = None
     leader: str = ""
+    foot_radius: float = 0.0
 
 
 def stage_of(config: Mapping[str, Any]) -> Stage:
@@ -54,12 +56,16 @@ def stage_of(config: Mapping[str, Any]) -> Stage:
 def stage_data(stage: Stage) -> dict[str, Any]:
     """Shapes and moving parts, ready for JSON; to be added to the robot's own."""
     commands: list[Command] = []
-    bounds = None
+    bounds, rough = None, {}
     if stage.plan is not None:
         commands.append(group(f"{WORLD}/things", [_solid(solid) for solid in stage.plan.solids]))
         if stage.plan.marker is not None:
             commands.append(group(f"{WORLD}/marker", _standing_marker(stage.plan.marker)))
-        bounds = list(stage.plan.bounds)
+        if stage.plan.is_even:
+            bounds = list(stage.plan.bounds)
+        else:
+            # No room to look around in, but ground to look at from near by.
+            rough = {"rough": {"floor": stage.plan.floor, "below": stage.foot_radius}}
     leader = None
     if stage.leader in READY:
         wheeled = READY[stage.leader]()
@@ -68,7 +74,7 @@ def stage_data(stage: Stage) -> dict[str, Any]:
             "axle": wheeled.wheels[0].radius,
             "wheels": [_wheel_node(k, w) for k, w in enumerate(wheeled.wheels)],
         }
-    return {"surroundings": commands, "bounds": bounds, "leader": leader}
+    return {"surroundings": commands, "bounds": bounds, "leader": leader, **rough}
 
 
 def leader_commands(kind: str, wheeled: WheeledRobot) -> list[Command]:
@@ -157,6 +163,8 @@ def _solid(solid: Solid) -> Visual:
     placement = translation(solid.x, solid.y, solid.z)
     c, s = math.cos(solid.yaw), math.sin(solid.yaw)
     placement[:2, :2] = [[c, -s], [s, c]]
+    if solid.pitch:
+        placement[:3, :3] = rotation_from_rpy(np.array([0.0, solid.pitch, solid.yaw]))
     size = solid.size if solid.shape == "box" else (0.5 * solid.size[0], solid.size[2])
     return Visual(
         path=f"{WORLD}/things/{solid.name}", shape=solid.shape, size=size, placement=placement,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,13 @@ from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.types import FloatArray, LidarScan
 from bluefoot_mpc.viz.animation import animation_data
+from bluefoot_mpc.viz.crossing_series import CrossingSeries
 from bluefoot_mpc.viz.packing import pack, stride_for
 from bluefoot_mpc.viz.scans import is_usable, known_plan
 from bluefoot_mpc.viz.scene import build_scene
 from bluefoot_mpc.viz.series import RunSeries
 from bluefoot_mpc.viz.stage import Stage, stage_data, stage_of, wheel_angles, wheel_steering
+from bluefoot_mpc.viz.stage_ground import terrain_data
 from bluefoot_mpc.wheels.ready import READY
 
 MAX_SWEEPS = 1200
@@ -27,34 +29,45 @@ RAYS = 230
 _LEADER_ROWS = 1500
 
 
-def replay_data(run: RunData, series: RunSeries, robot: RobotModel) -> dict[str, Any]:
+def replay_data(
+    run: RunData, series: RunSeries, robot: RobotModel, crossing: CrossingSeries | None = None
+) -> dict[str, Any]:
     """Everything that the 3D replay of a run needs, ready for JSON.
 
     Args:
         run: the run.
         series: its time series.
         robot: the robot that ran.
+        crossing: how it crossed rough ground; None where it did not.
     """
     parameters = robot.parameters
-    data = animation_data(build_scene(robot), series, parameters.legs.foot_radius)
-    return data | moving_data(run, series, parameters.sensors)
+    radius = parameters.legs.foot_radius
+    below = radius if series.has_truth else 0.0
+    data = animation_data(build_scene(robot), series, radius)
+    data |= moving_data(run, series, parameters.sensors, below)
+    if crossing is None:
+        return data
+    return {"rough": {"floor": 0.0, "below": below}, **data, "terrain": terrain_data(crossing)}
 
 
-def moving_data(run: RunData, series: RunSeries, mounts: SensorMounts) -> dict[str, Any]:
+def moving_data(
+    run: RunData, series: RunSeries, mounts: SensorMounts, foot_radius: float = 0.0
+) -> dict[str, Any]:
     """Surroundings, leader and sweeps of a run, ready for JSON; empty for a run on open floor without any.
 
     Args:
         run: the run.
         series: its time series.
         mounts: where the sensors are.
+        foot_radius: m, from the feet of the series down to the ground.
     """
     moves = any(np.isfinite(sample.leader[:1]).any() for sample in run.truth[:1])
     stage = stage_of(run.config)
     stage = Stage(plan=known_plan(run, mounts), leader=stage.leader if moves else "")
-    sweeps = _sweeps(run, series, mounts.lidar)
+    sweeps = _sweeps(run, series, mounts)
     if stage == Stage() and sweeps is None:
         return {}
-    data = stage_data(stage)
+    data = stage_data(replace(stage, foot_radius=foot_radius))
     if data["leader"] is not None:
         data["leader"] |= _leader(run, series, stage.leader)
     waypoints = [record.motion.guide.waypoints for record in run.telemetry if record.motion.guide is not None]
@@ -79,7 +92,7 @@ def _leader(run: RunData, series: RunSeries, kind: str) -> dict[str, Any]:
     }
 
 
-def _sweeps(run: RunData, series: RunSeries, mount: Sequence[float]) -> dict[str, Any] | None:
+def _sweeps(run: RunData, series: RunSeries, mounts: SensorMounts) -> dict[str, Any] | None:
     """Distances of a part of the rays of a part of the sweeps; None without any."""
     scans = [frame.lidar for frame in run.frames[: len(series.time)] if is_usable(frame.lidar)]
     if not scans:
@@ -92,7 +105,8 @@ def _sweeps(run: RunData, series: RunSeries, mount: Sequence[float]) -> dict[str
     every = stride_for(rays, RAYS)
     millimetres = np.array([to_millimetres(scan, every) for scan in scans])
     return {
-        "mount": [float(x) for x in mount],
+        "mount": [float(x) for x in mounts.lidar],
+        **({"turn": mounts.lidar_rotation.ravel().tolist()} if any(mounts.lidar_rpy_deg) else {}),
         "bearing": pack(scans[0].bearing[::every]),
         "time": pack([scan.time - start for scan in scans]),
         "distance": base64.b64encode(millimetres.tobytes()).decode("ascii"),

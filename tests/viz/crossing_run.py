@@ -143,9 +143,9 @@ def _scan(run: RunData, k: int, rpy: FloatArray, ground: Relief, rng: np.random.
     turn = rotation_from_rpy(rpy)
     start = run.truth[k].q[:3] + turn @ LIDAR
     rays = np.column_stack([np.cos(BEARING), np.sin(BEARING), np.zeros(len(BEARING))]) @ turn.T
-    # From above the highest block down to the floor.
+    # From above the highest ground down to below the lowest.
     down = np.where(rays[:, 2] < -0.08, -rays[:, 2], np.nan)
-    away = (start[2] - np.linspace(0.03, 0.0, 16)[:, None]) / down
+    away = (start[2] - np.linspace(0.08, -0.09, 60)[:, None]) / down
     along = start + away[..., None] * rays
     met = np.isfinite(down)
     below = along[..., 2] <= np.nan_to_num(ground.height(along[..., :2])) + 1e-9

@@ -46,8 +46,10 @@ class Recording {
   support(i) {
     const points = [];
     for (let leg = 0; leg < 4; leg++) if (this.scheduled(i, leg)) points.push(this.foot(i, leg));
-    return hull(points.map((p) => [p[0], p[1]]));
+    return hull(points.map((p) => [p[0], p[1], p[2]]));
   }
+  // Height of the ground under a foot: on uneven ground what the foot itself tells.
+  under(x, y, z) { return this.data.rough ? z - this.data.rough.below : this.groundHeight(x, y); }
 }
 
 // Degrees of an angle in rad, as text without a negative zero.
@@ -99,7 +101,7 @@ class Clock {
 
 class View3D {
   constructor(pane, recording) {
-    this.pane = pane; this.rec = recording; this.follow = true; this.shown = { support: true, path: true, sweep: true };
+    this.pane = pane; this.rec = recording; this.follow = true; this.shown = { support: true, path: true, sweep: true, cloud: true, map: false };
     const viewer = this.viewer = new MeshCat.Viewer(pane);
     viewer.set_3d_pane_size = () => this.resize();
     viewer.gui.domElement.remove();
@@ -117,6 +119,8 @@ class View3D {
     this.leader = leader ? new LeaderView(viewer, leader) : null;
     this.sweeps = sweeps ? new SweepView(viewer.scene, sweeps, recording) : null;
     this.goals = sweeps || waypoints ? new GoalView(viewer.scene) : null;
+    const { terrain } = recording.data;
+    this.ground = terrain ? new GroundView(viewer.scene, terrain, recording.data.legs) : null;
     if (waypoints) this.goals.place(waypoints, 0, null);
     this.trunk = [0, 0, 0];
     this.preset("corner");
@@ -160,7 +164,7 @@ class View3D {
     shade.receiveShadow = true;
     shade.position.z = 0.0004;
     this.floor.add(shade);
-    const [, b, c] = this.rec.data.ground;
+    const [, b, c] = this.rec.data.rough ? [0, 0, 0] : this.rec.data.ground;
     this.floor.quaternion.setFromUnitVectors(new T.Vector3(0, 0, 1), new T.Vector3(-b, -c, 1).normalize());
     viewer.scene.add(this.floor);
     viewer.camera.fov = 33;
@@ -226,15 +230,15 @@ class View3D {
     const rec = this.rec, points = this.path.geometry.getAttribute("position");
     if (i < this.drawn - 1 && rec.count < this.drawn) this.drawn = 0;
     for (; this.drawn <= i; this.drawn++) {
-      const x = rec.q[rec.width * this.drawn], y = rec.q[rec.width * this.drawn + 1];
-      points.setXYZ(this.drawn, x, y, rec.groundHeight(x, y) + 0.0015);
+      const [x, y, z] = rec.q.subarray(rec.width * this.drawn, rec.width * this.drawn + 3);
+      points.setXYZ(this.drawn, x, y, rec.data.rough ? z : rec.groundHeight(x, y) + 0.0015);
       points.needsUpdate = true;
     }
     this.path.geometry.setDrawRange(0, this.shown.path ? i + 1 : 0);
   }
   // Camera and target live in a frame that meshcat turns: world (x, y, z) is local (x, z, -y).
   preset(name) {
-    const offsets = { corner: this.room ? [-1.0, -1.25, 1.55] : [0.62, -0.85, 0.42], side: [0.02, -1.15, 0.16], front: [1.15, 0.0, 0.18], top: [-0.01, 0, 1.5] };
+    const offsets = { corner: this.room ? [-1.0, -1.25, 1.55] : this.rec.data.rough ? [-0.62, -0.95, 0.62] : [0.62, -0.85, 0.42], side: [0.02, -1.15, 0.16], front: [1.15, 0.0, 0.18], top: [-0.01, 0, 1.5] };
     const [x, y] = this.trunk, z = this.rec.groundHeight(x, y);
     const { camera, controls } = this.viewer;
     if (name === "path") {
@@ -244,8 +248,8 @@ class View3D {
       camera.position.set(cx + 0.15 * away, 0.62 * away, -cy + 0.95 * away);
       this.viewer.scene.fog.far = 5.2 + 3 * size;
     } else {
-      const [dx, dy, dz] = offsets[name];
-      controls.target.set(x, z + 0.06, -y);
+      const [dx, dy, dz] = offsets[name], ahead = name === "corner" && this.rec.data.rough ? 0.3 : 0;  // m
+      controls.target.set(x + ahead, z + 0.06, -y);
       camera.position.set(x + dx, z + 0.06 + dz, -(y + dy));
       this.viewer.scene.fog.far = this.far;
     }
@@ -279,6 +283,7 @@ class View3D {
     this.extendPath(i);
     if (this.leader && this.leader.time) this.leader.show(t);
     if (this.sweeps && this.sweeps.time) this.sweeps.show(t, this.shown.sweep);
+    if (this.ground && this.ground.aims) this.ground.show(t, this.shown);
     this.move(trunk);
     this.viewer.set_dirty();
   }
@@ -286,7 +291,7 @@ class View3D {
     const rec = this.rec, corners = rec.support(i), position = this.support.geometry.getAttribute("position");
     this.discs.forEach((disc, leg) => {
       const x = foot(leg, 0), y = foot(leg, 1);
-      disc.position.set(x, y, rec.groundHeight(x, y) + 0.0025);
+      disc.position.set(x, y, rec.under(x, y, foot(leg, 2)) + 0.0025);
       disc.quaternion.copy(this.floor.quaternion);
       disc.visible = Boolean(rec.loaded(i, leg));
     });
@@ -294,13 +299,14 @@ class View3D {
     this.support.visible = visible && corners.length >= 3;
     this.edge.visible = visible;
     for (let k = 0; k < 4; k++) {
-      const [x, y] = corners[Math.min(k, corners.length - 1)] || [0, 0];
-      position.setXYZ(k, x, y, rec.groundHeight(x, y) + 0.002);
+      const [x, y, z] = corners[Math.min(k, corners.length - 1)] || [0, 0, 0];
+      position.setXYZ(k, x, y, rec.under(x, y, z) + 0.002);
     }
     position.needsUpdate = true;
     const x = rec.zmp[2 * i], y = rec.zmp[2 * i + 1];
     this.zmp.visible = this.shown.support && Number.isFinite(x);
-    if (this.zmp.visible) this.zmp.position.set(x, y, rec.groundHeight(x, y) + 0.003);
+    const middle = corners.reduce((sum, p) => sum + p[2], 0) / Math.max(1, corners.length);
+    if (this.zmp.visible) this.zmp.position.set(x, y, rec.under(x, y, middle) + 0.003);
   }
   showPush(i, trunk) {
     const rec = this.rec;
@@ -325,7 +331,8 @@ class View3D {
     this.light(trunk[0], trunk[1], z);
     // The floor moves by whole tiles, so that it seems to be endless and at rest.
     const fx = 0.2 * Math.round(trunk[0] / 0.2), fy = 0.2 * Math.round(trunk[1] / 0.2);
-    this.floor.position.set(fx, fy, this.rec.groundHeight(fx, fy));
+    const { rough } = this.rec.data;
+    this.floor.position.set(fx, fy, rough ? rough.floor : this.rec.groundHeight(fx, fy));
   }
 }
 

@@ -68,6 +68,7 @@ class SweepView {
   constructor(scene, data, recording) {
     const T = MeshCat.THREE;
     this.rec = recording; this.mount = data.mount; this.shown = -1;
+    this.turn = data.turn || [1, 0, 0, 0, 1, 0, 0, 0, 1];  // of the scan plane on the trunk, row by row
     this.bearing = unpack(data.bearing);
     this.time = data.time ? unpack(data.time) : null;
     this.distance = data.distance ? new Uint16Array(unpack(data.distance).buffer) : null;
@@ -85,7 +86,8 @@ class SweepView {
     this.bearing.forEach((bearing, k) => {
       const away = millimetres[k] / 1000 - 0.02;  // m; shown a little before what they met, or it would hide them
       if (!(away > 0.05)) return;
-      point.set(x + away * Math.cos(bearing), y + away * Math.sin(bearing), z).applyQuaternion(turn);
+      const u = away * Math.cos(bearing), v = away * Math.sin(bearing), [xx, xy, , yx, yy, , zx, zy] = this.turn;
+      point.set(x + xx * u + xy * v, y + yx * u + yy * v, z + zx * u + zy * v).applyQuaternion(turn);
       position.setXYZ(n++, pose[0] + point.x, pose[1] + point.y, pose[2] + point.z);
     });
     this.points.geometry.setDrawRange(0, n);
