@@ -40,6 +40,7 @@ _FILES = (
     ("summary", "summary.json"),
     ("configuration", "config.toml"),
     ("learnt weights", "narx.npz"),
+    ("cloud", "cloud.ply"),
 )
 
 

@@ -10,13 +10,18 @@ from pathlib import Path
 
 from bluefoot_mpc.exceptions import ConfigurationError, LogError
 from bluefoot_mpc.leveling.narx import NarxWeights, save_weights
+from bluefoot_mpc.runtime.clouds import run_cloud
+from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.scenarios.options import RunOptions
+from bluefoot_mpc.terrain.cloud_files import write_cloud
 
 LOG, SUMMARY, REPORT, CONFIG = "log.mcap", "summary.json", "report.html", "config.toml"
 """Files that every run writes."""
 WEIGHTS, START_WEIGHTS = "narx.npz", "narx_start.npz"
 """What the levelling network has learnt, and, where it was loaded, what it began with."""
-FILES = (LOG, SUMMARY, REPORT, CONFIG, WEIGHTS, START_WEIGHTS)
+CLOUD = "cloud.ply"
+"""What the LIDAR met of rough ground, where the robot looked at it."""
+FILES = (LOG, SUMMARY, REPORT, CONFIG, WEIGHTS, START_WEIGHTS, CLOUD)
 
 
 def make_folder(options: RunOptions, scenario: str) -> Path:
@@ -53,6 +58,17 @@ def keep_weights(weights: NarxWeights | None, file: Path) -> None:
     if weights is not None:
         with writing(file):
             save_weights(file, weights)
+
+
+def keep_cloud(run: RunData, file: Path) -> None:
+    """Write what a run's LIDAR met of the ground, where it met any.
+
+    Raises:
+        CloudFileError: the file cannot be written.
+    """
+    cloud = run_cloud(run.telemetry, run.frames)
+    if len(cloud.time):
+        write_cloud(file, cloud)
 
 
 def start_weights(folder: Path) -> str:

@@ -15,6 +15,7 @@ from bluefoot_mpc.scenarios.navigating import Goto, Wander
 from bluefoot_mpc.scenarios.posing import Pose, Stand
 from bluefoot_mpc.scenarios.remote import Remote
 from bluefoot_mpc.scenarios.seeking import Approach, Follow
+from bluefoot_mpc.scenarios.sweeping import Sweep
 from bluefoot_mpc.scenarios.walking import Push, Transition, Turn, Walk
 
 SHIPPED: dict[str, type[Scenario]] = {
@@ -31,6 +32,7 @@ SHIPPED: dict[str, type[Scenario]] = {
         Goto,
         Approach,
         Follow,
+        Sweep,
         Rough,
         Remote,
     )

@@ -24,12 +24,14 @@ from bluefoot_mpc.runtime.summary import summarize
 from bluefoot_mpc.scenarios.base import Criterion
 from bluefoot_mpc.scenarios.config import Resolved, resolve
 from bluefoot_mpc.scenarios.folder import (
+    CLOUD,
     CONFIG,
     LOG,
     REPORT,
     START_WEIGHTS,
     SUMMARY,
     WEIGHTS,
+    keep_cloud,
     keep_weights,
     log_in,
     make_folder,
@@ -173,6 +175,7 @@ def _run_made(
         result = _judge(data, resolved, made, folder)
         _write_results(result, made.model, options.report)
         keep_weights(made.pipeline.learnt, folder / WEIGHTS)
+        keep_cloud(result.data, folder / CLOUD)
     return result
 
 

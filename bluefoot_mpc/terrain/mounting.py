@@ -1,10 +1,10 @@
 """How the LIDAR is really turned on the trunk, found from a sweep of a flat, level floor.
 
-A scan plane that is turned on the trunk sees a flat floor bent: a wrong roll tilts it sideways, a wrong pitch
-lifts it the more the further away, a wrong height shifts all of it. A wrong yaw tilts it sideways too, but the
-more the further the nose is down; that is little to go by, so yaw comes out a few times less certain. The
-place along x and y moves points within the floor and cannot be found from it. A floor that slopes looks like
-a sensor that is turned, so the floor must be level.
+A scan plane that is turned on the trunk sees a flat floor bent: a wrong roll tilts it sideways, a wrong
+pitch lifts it the more the further away, a wrong height shifts all of it. A wrong yaw tilts it sideways
+too, but the more the further the nose is down; that is little to go by, so yaw comes out a few times less
+certain. The place along x and y moves points within the floor and cannot be found from it. A floor that
+slopes looks like a sensor that is turned, so the floor must be level.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from bluefoot_mpc.geometry import rotation_from_quaternion, rotation_from_rpy, r
 from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
 from bluefoot_mpc.types import FloatArray, LidarScan
-
 
 _YAW_SHARE = 3.0
 """Yaw is seen as the roll that changes with sin(pitch), by a third from 11 to 31 degrees."""
@@ -161,9 +160,7 @@ def find_mounting(
     config = config or MountingConfig()
     slope = math.degrees(floor.slope)
     if not (math.isfinite(floor.height) and slope <= config.max_slope_deg):
-        return _refused(
-            mounts, f"the floor slopes by {slope:.1f} degrees under the feet: sweep a level floor"
-        )
+        return _refused(mounts, f"floor slopes by {slope:.1f} degrees: sweep a level one")
     rays, fault = _rays(looks, config)
     if fault:
         return _refused(mounts, fault)
@@ -173,9 +170,7 @@ def find_mounting(
             fit, rays, floor.height, mounts, (config, config.first_band if k < 2 else config.band)
         )
         if fit.points < config.least_points:
-            return _refused(
-                mounts, f"only {fit.points} points lie on the floor: sweep a floor that is free and flat"
-            )
+            return _refused(mounts, f"only {fit.points} points on the floor: sweep a free one")
     return _judged(fit, mounts, config)
 
 
@@ -183,16 +178,9 @@ def _judged(fit: _Fit, mounts: SensorMounts, config: MountingConfig) -> Mounting
     """The result of the least squares, or why it is none."""
     roll, pitch, yaw = np.degrees(rpy_from_rotation(fit.rotation)).tolist()
     if fit.share < config.least_share or fit.misfit > config.max_misfit:
-        return _refused(
-            mounts,
-            f"the floor is not flat: its heights spread {fit.misfit:.1f} times as much as the sensor's "
-            f"noise, {100.0 * (1.0 - fit.share):.0f} % of the points lie off it; sweep a flat floor",
-        )
+        return _refused(mounts, f"floor not flat ({fit.misfit:.1f} x noise): sweep a flat one")
     if math.hypot(roll, pitch) > config.max_angle_deg:
-        return _refused(
-            mounts, f"roll {roll:.1f} and pitch {pitch:.1f} degrees are no error of mounting: "
-            "look at the sensor, and whether the floor is level",
-        )  # fmt: skip
+        return _refused(mounts, f"tilted by {math.hypot(roll, pitch):.1f} degrees: look at the sensor")
     angle = math.radians(config.pose_error_deg)
     shared = np.array((angle, angle, _YAW_SHARE * angle, config.pose_error))
     spread = np.sqrt(np.diag(fit.covariance) + shared**2)
@@ -227,13 +215,10 @@ def _rays(looks: Sequence[PosedScan], config: MountingConfig) -> tuple[_Rays, st
             _Rays(ends, distance, np.full(n, float(number)), np.tile(up, (n, 1)), np.full(n, position[2]))
         )
     if len(parts) < config.least_scans:
-        return _Rays(*[np.zeros(0)] * 5), f"only {len(parts)} usable scans"
+        return _Rays(*[np.zeros(0)] * 5), f"only {len(parts)} usable scans: sweep more levels"
     span = math.degrees(max(pitches) - min(pitches))
     if span < config.least_span_deg:
-        return _Rays(*[np.zeros(0)] * 5), (
-            f"the trunk pitched through {span:.1f} degrees only: "
-            "pitch and height of the sensor cannot be told apart"
-        )
+        return _Rays(*[np.zeros(0)] * 5), (f"pitched through {span:.1f} degrees only: sweep further")
     return _Rays(*(np.concatenate(column) for column in zip(*parts, strict=True))), ""
 
 
