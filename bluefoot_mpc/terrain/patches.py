@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from scipy.sparse.csgraph import connected_components
 
 from bluefoot_mpc.settings import require_positive, require_range
 from bluefoot_mpc.types import BoolArray, FloatArray, HeightMap
+
+T = TypeVar("T", bound=np.generic)
+Labels = NDArray[np.intp]
 
 _AROUND = tuple((di, dj) for di in (-1, 0, 1) for dj in (-1, 0, 1))
 _HALF = ((0, 1), (1, -1), (1, 0), (1, 1))
@@ -52,7 +56,7 @@ class Patches:
         carries: (k,) whether a foot can be set on it.
     """
 
-    label: NDArray[np.intp]
+    label: Labels
     height: FloatArray
     size: FloatArray
     slope: FloatArray
@@ -76,8 +80,7 @@ def segment(ground: HeightMap, config: PatchConfig | None = None) -> Patches:
     height = np.where(ground.confidence > config.confidence, ground.height, np.nan)
     slope, roughness = cell_planes(height, ground.cell, config)
     good = (slope <= math.radians(config.slope_deg)) & (roughness <= config.roughness)  # False at NaN
-    label, links = _connect(height, good, config.step)
-    return _describe(height, label, links, ground.cell, config)
+    return _describe(height, _label(height, good, config.step), ground.cell, config)
 
 
 def cell_planes(height: FloatArray, cell: float, config: PatchConfig) -> tuple[FloatArray, FloatArray]:
@@ -123,34 +126,58 @@ def cell_planes(height: FloatArray, cell: float, config: PatchConfig) -> tuple[F
     return np.where(enough, slope, np.nan), np.where(enough, roughness, np.nan)
 
 
-def _connect(
-    height: FloatArray, good: BoolArray, step: float
-) -> tuple[NDArray[np.intp], tuple[NDArray[np.intp], FloatArray]]:
-    """Labels (n, m) of the patches, and of each of their links the cell it starts from and its step."""
+def _label(height: FloatArray, good: BoolArray, step: float) -> Labels:
+    """(n, m) patch of each cell: first of those that are well inside, then of the rest.
+
+    A cell is inside where small steps part it from good cells all around. Patches grow
+    together through such cells alone: two stray heights across a gap join nothing.
+    """
+    inside = good.copy()
+    for di, dj in _AROUND:
+        inside &= _joined(height, good, (di, dj), step)
+    label = _components(height, inside, step)
+    _spread(label, height, good, step)
+    left = good & (label < 0)
+    rest = _components(height, left, step)
+    return np.where(left, rest + label.max(initial=-1) + 1, label)
+
+
+def _joined(height: FloatArray, good: BoolArray, offset: tuple[int, int], step: float) -> BoolArray:
+    """(n, m) whether a cell and its neighbour at an offset are good, and a small step apart."""
+    rise = np.abs(_shifted(height, *offset) - height)  # NaN where either is unknown: not small
+    return np.asarray(good & (_shifted(good.astype(np.float64), *offset) == 1.0) & (rise <= step))
+
+
+def _components(height: FloatArray, good: BoolArray, step: float) -> Labels:
+    """(n, m) from 0: cells that are joined, one by one, have the same label; -1 where they are not good."""
     number = np.arange(height.size).reshape(height.shape)
-    ends = []
+    starts, ends = [], []
     for di, dj in _HALF:
-        other = _shifted(height, di, dj)
-        rise = np.abs(other - height)
-        joined = good & (_shifted(good.astype(np.float64), di, dj) == 1.0) & (rise <= step)
-        first = number[joined]
-        ends.append((first, first + di * height.shape[1] + dj, rise[joined]))
-    start, end, rises = (np.concatenate(part) for part in zip(*ends, strict=True))
+        first = number[_joined(height, good, (di, dj), step)]
+        starts.append(first)
+        ends.append(first + di * height.shape[1] + dj)
+    start, end = np.concatenate(starts), np.concatenate(ends)
     graph = coo_array((np.ones(len(start)), (start, end)), shape=(height.size, height.size))
     _, group = connected_components(graph, directed=False)
     label = np.full(height.size, -1, dtype=np.intp)
     cells = np.flatnonzero(good)
     label[cells] = np.unique(group[cells], return_inverse=True)[1]
-    return label.reshape(height.shape), (start, rises)
+    return label.reshape(height.shape)
 
 
-def _describe(
-    height: FloatArray,
-    label: NDArray[np.intp],
-    links: tuple[NDArray[np.intp], FloatArray],
-    cell: float,
-    config: PatchConfig,
-) -> Patches:
+def _spread(label: Labels, height: FloatArray, good: BoolArray, step: float) -> None:
+    """Give good cells beside patches the label of the neighbour that is nearest in height, where one is."""
+    least, nearest = np.full(height.shape, step), np.full(height.shape, -1, dtype=np.intp)
+    padded = np.pad(label, 1, constant_values=-1)
+    for di, dj in _AROUND:
+        rise = np.abs(_shifted(height, di, dj) - height)
+        other = _window(padded, di, dj)
+        better = good & (label < 0) & (other >= 0) & (rise <= least)
+        least[better], nearest[better] = rise[better], other[better]
+    np.copyto(label, nearest, where=nearest >= 0)
+
+
+def _describe(height: FloatArray, label: Labels, cell: float, config: PatchConfig) -> Patches:
     """Area, plane, step and roughness of every patch."""
     patches = int(label.max(initial=-1)) + 1
     inside = label >= 0
@@ -172,18 +199,31 @@ def _describe(
     slope_i, slope_j = (jj * zi - ij * zj) / area, (ii * zj - ij * zi) / area
     slope = np.arctan(np.hypot(slope_i, slope_j))
     roughness = np.sqrt(np.maximum(zz - slope_i * zi - slope_j * zj, 0.0) / count)
-    step = np.zeros(patches)
-    np.maximum.at(step, label.ravel()[links[0]], links[1])
     size = count * cell**2
     carries = (size >= config.area * (1.0 - 1e-9)) & (slope <= math.radians(config.slope_deg))
     carries &= roughness <= config.roughness
     return Patches(
-        label=label, height=centre[2], size=size, slope=slope, step=step, roughness=roughness, carries=carries
-    )
+        label=label, height=centre[2], size=size, slope=slope, step=_steps(height, label, patches),
+        roughness=roughness, carries=carries,
+    )  # fmt: skip
+
+
+def _steps(height: FloatArray, label: Labels, patches: int) -> FloatArray:
+    """(k,) m, greatest difference of height between neighbouring cells of each patch."""
+    step = np.zeros(patches)
+    padded = np.pad(label, 1, constant_values=-1)
+    for di, dj in _HALF:
+        same = (label >= 0) & (_window(padded, di, dj) == label)
+        np.maximum.at(step, label[same], np.abs(_shifted(height, di, dj) - height)[same])
+    return step
 
 
 def _shifted(values: FloatArray, di: int, dj: int) -> FloatArray:
     """(n, m), at [i, j] the value at [i + di, j + dj]; NaN beyond the rim."""
-    n, m = values.shape
-    padded = np.pad(values, 1, constant_values=np.nan)
+    return _window(np.pad(values, 1, constant_values=np.nan), di, dj)
+
+
+def _window(padded: NDArray[T], di: int, dj: int) -> NDArray[T]:
+    """(n, m) of an array with a rim of one cell, moved by an offset."""
+    n, m = padded.shape[0] - 2, padded.shape[1] - 2
     return padded[1 + di : 1 + di + n, 1 + dj : 1 + dj + m]

@@ -83,6 +83,34 @@ def test_unknown_and_untrusted_cells_are_in_no_patch_and_part_patches():
     np.testing.assert_array_equal(untrusted.label, patches.label)
 
 
+def test_stray_heights_across_a_gap_join_nothing():
+    height = np.zeros((12, 13))
+    height[:, 5:8] = np.nan
+    height[5:7, 5:8] = 0.001
+    patches = segment(as_map(height))
+    left, right = patches.label[0, 0], patches.label[0, 12]
+    assert left != right
+    assert (patches.label[:, :5] == left).all()
+    assert (patches.label[:, 8:] == right).all()
+
+
+def test_a_block_of_two_by_two_cells_is_a_patch():
+    height = np.full((6, 6), 0.0)
+    height[2:4, 2:4] = 0.05
+    patches = segment(as_map(height))
+    assert len(np.unique(patches.label[2:4, 2:4])) == 1
+    assert patches.label[2, 2] != patches.label[0, 0]
+    assert patches.height[patches.label[2, 2]] == pytest.approx(0.05)
+
+
+def test_step_is_the_greatest_within_a_patch_even_where_it_joins_nothing():
+    height = np.zeros((14, 14))
+    height[:, :7] = np.linspace(0.02, 0.0, 14)[:, None]
+    patches = segment(as_map(height), PatchConfig(step=0.008))
+    assert patches.label[13, 0] == patches.label[0, 0] == patches.label[0, 13]
+    assert patches.step[patches.label[0, 0]] == pytest.approx(0.02)
+
+
 def test_a_cell_alone_is_in_no_patch():
     height = np.full((5, 5), np.nan)
     height[2, 2] = 0.0
