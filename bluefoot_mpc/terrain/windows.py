@@ -8,8 +8,8 @@ which cell:
 - `MEAN`: the one to which the moves towards it (both indices change until they fit, then straight on) cost
   least in the mean over their cells.
 
-With a window of one cell both are the same. `MEAN` is the default: with it larger windows find cheaper ways, as
-in the thesis; docs/terrain-planning.md has the figures.
+With a window of one cell both are the same. `MEAN` is the default: with it larger windows find cheaper ways,
+as in the thesis; docs/terrain-planning.md has the figures.
 
 Among equals the one that is least aside is aimed at, so that even ground is crossed straight. The thesis'
 tensor has no infinite cells; here a cell is not aimed at where the first step towards it would go to an
