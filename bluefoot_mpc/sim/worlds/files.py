@@ -12,10 +12,14 @@ import numpy as np
 from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.settings import build, dump_toml, read_toml, to_table
 from bluefoot_mpc.sim.worlds import footprint
+from bluefoot_mpc.sim.worlds.heights import heights
 from bluefoot_mpc.sim.worlds.plan import WorldPlan
 
 START_RADIUS = 0.35
 """m around the origin that must be free in any world: the robot stands there with its legs."""
+
+EVEN = 0.003
+"""m, by which ground may differ from height zero where the robot starts."""
 
 GREATEST_SIDE = 60.0
 """m; the floor's cells must fit into memory."""
@@ -25,6 +29,7 @@ _HEADER = """\
 # bounds: least x, least y, greatest x, greatest y of the floor that counts.
 # A solid: shape is box or cylinder; x, y, z its centre (without z it stands on the floor);
 # size is length, width and height, of a cylinder twice the diameter and the height; yaw turns it left.
+# is_ground: to be walked on; such a box may be tilted by pitch, nose down. floor is the floor's height.
 
 """
 
@@ -32,7 +37,7 @@ _HEADER = """\
 def read_plan(path: Path) -> WorldPlan:
     """Read a plan, and check that a robot can start in it.
 
-    What may be left out: name (the file's), seed, z, yaw, colour and marker.
+    What may be left out: name (the file's), seed, floor, z, yaw, pitch, is_ground, colour and marker.
 
     Raises:
         ConfigurationError: the file cannot be read, or says what cannot be.
@@ -50,6 +55,7 @@ def read_plan(path: Path) -> WorldPlan:
         _require_known(table)
         plan = build(WorldPlan, table)
         _require_start(plan)
+        _require_even_start(plan)
         _require_free_marker(plan)
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: {error}") from error
@@ -94,6 +100,22 @@ def _require_start(plan: WorldPlan) -> None:
     marker = plan.marker
     if marker is not None and np.hypot(marker.x, marker.y) - marker.radius < START_RADIUS:
         raise ConfigurationError(f"the marker stands in the start: {way_out.replace('solid', 'marker')}")
+
+
+def _require_even_start(plan: WorldPlan) -> None:
+    """Refuse ground that is not at height zero where the robot starts."""
+    if plan.is_even:
+        return
+    reach = np.arange(-START_RADIUS, START_RADIUS + 1e-9, 0.01)
+    places = np.stack(np.meshgrid(reach, reach), axis=-1)
+    places = places[np.hypot(places[..., 0], places[..., 1]) <= START_RADIUS]
+    worst = float(np.abs(heights(plan, places)).max())
+    if worst > EVEN:
+        raise ConfigurationError(
+            f"the ground under the start is not even: {1e3 * worst:.0f} mm off height zero. Within"
+            f" {START_RADIUS:g} m of the origin it must be at zero, within {1e3 * EVEN:.0f} mm: move what"
+            " is there, or put a piece of ground with its top at zero under it"
+        )
 
 
 def _require_known(table: Mapping[str, Any]) -> None:

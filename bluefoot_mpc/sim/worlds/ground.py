@@ -80,7 +80,7 @@ def ramp(rng: np.random.Generator, config: WorldConfig) -> list[Solid]:
 def kerb(rng: np.random.Generator, config: WorldConfig) -> list[Solid]:
     """One step up across the whole way, turned a little; the ground stays up behind it."""
     x, yaw = _front(rng, _EDGE)
-    size = (_FAR + _MORE - x, 2.0 * HALF_WIDTH)
+    size = (_FAR + _MORE - x, 2.0 * (HALF_WIDTH + _MORE))
     return [slab("kerb", _ahead(x, yaw, 0.5 * size[0]), size, (0.0, config.relief), yaw, shade(0.5, 1.0))]
 
 
