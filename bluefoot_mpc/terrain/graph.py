@@ -20,7 +20,7 @@ from bluefoot_mpc.terrain.lattice import Goal, Path, Start, reached_path, short_
 from bluefoot_mpc.terrain.windows import search
 from bluefoot_mpc.types import BoolArray, FloatArray
 
-_BOUNDING_WINDOWS = (1, 5, 15)
+_BOUNDING_WINDOWS = (1, 5)
 """Windows whose greedy ways bound the search from above."""
 _SLACK = 1e-9
 """Of the bound, that sums may differ by rounding."""
