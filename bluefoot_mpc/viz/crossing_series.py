@@ -183,7 +183,7 @@ def extract_crossing(run: RunData, series: RunSeries, foot_radius: float) -> Cro
         feet_estimate=feet_estimate,
         swings=_swings(series, reports, feet_estimate),
         maps=tuple(MapAt(k, r.ground) for k, r in enumerate(reports) if r is not None and is_map(r.ground)),
-        routes=tuple(RouteAt(k, r.route) for k, r in enumerate(reports) if r is not None and _is_route(r)),
+        routes=tuple(RouteAt(k, r.route) for k, r in enumerate(reports) if r is not None and is_route(r)),
         points=points,
         point_time=point_time,
         seen=seen,
@@ -201,7 +201,8 @@ def is_map(ground: HeightMap | None) -> TypeGuard[HeightMap]:
     return bool(ground.cell > 0.0 and np.isfinite(ground.pose).all() and np.isfinite(ground.cell))
 
 
-def _is_route(report: CrossingReport) -> bool:
+def is_route(report: CrossingReport) -> bool:
+    """True of a report with a new way that can be drawn."""
     route = report.route
     return route.ndim == 2 and len(route) > 0 and bool(np.isfinite(route[:, :2]).all())
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -20,6 +21,7 @@ from bluefoot_mpc.viz.page import embed_json, embed_script, render, template_tex
 from bluefoot_mpc.viz.scene import build_scene
 from bluefoot_mpc.viz.series import estimated_feet, estimated_q, from_virtual
 from bluefoot_mpc.viz.stage import Stage, stage_data
+from bluefoot_mpc.viz.stage_ground import LEAST_SPAN, colours
 from bluefoot_mpc.viz.stage_motion import RAYS
 
 _LOG = logging.getLogger(__name__)
@@ -55,7 +57,8 @@ class LiveView:
     def __init__(self, robot: RobotModel, stage: Stage | None = None) -> None:
         self.url = ""
         self._radius = robot.parameters.legs.foot_radius
-        self._around = LiveSurroundings(stage or Stage(), robot.parameters.sensors.lidar)
+        mounts = robot.parameters.sensors
+        self._around = LiveSurroundings(stage or Stage(), mounts.lidar, mounts.lidar_rotation)
         self._newest: tuple[Telemetry, TruthSample | None] | None = None
         self._wake = threading.Event()
         self._ending = False
@@ -133,7 +136,10 @@ def live_page(robot: RobotModel, stage: Stage | None = None) -> str:
         robot: the robot to draw.
         stage: what stands and moves around it.
     """
-    data = scene_data(build_scene(robot), robot.parameters.legs.foot_radius) | stage_data(stage or Stage())
+    radius = robot.parameters.legs.foot_radius
+    stage = replace(stage or Stage(), foot_radius=radius)
+    data = scene_data(build_scene(robot), radius) | stage_data(stage)
+    data["terrain"] = colours(LEAST_SPAN)
     # Sweeps come ready as points; the page only makes room for them.
     data["sweeps"] = {"mount": [0.0, 0.0, 0.0], "bearing": pack(np.zeros(RAYS))}
     return render(

@@ -8,6 +8,7 @@ import numpy as np
 
 from bluefoot_mpc.geometry import rotation_from_quaternion
 from bluefoot_mpc.types import FloatArray, LidarScan, Telemetry, TruthSample
+from bluefoot_mpc.viz.live_ground import LiveGround
 from bluefoot_mpc.viz.packing import stride_for
 from bluefoot_mpc.viz.scans import is_usable
 from bluefoot_mpc.viz.series import estimated_q
@@ -22,11 +23,16 @@ class LiveSurroundings:
     Args:
         stage: what stands and moves around the robot.
         mount: (3,) m, the LIDAR in the base frame.
+        turn: (3, 3) rotation from the LIDAR's frame to the base frame; None for one that is not turned.
     """
 
-    def __init__(self, stage: Stage, mount: tuple[float, float, float]) -> None:
+    def __init__(
+        self, stage: Stage, mount: tuple[float, float, float], turn: FloatArray | None = None
+    ) -> None:
         self._wheeled = READY[stage.leader]() if stage.leader in READY else None
         self._mount = np.array(mount)
+        self._turn = np.eye(3) if turn is None else turn
+        self._ground = LiveGround()
         self._sweep: tuple[FloatArray, LidarScan] | None = None
         self._time: float | None = None
         self._turned = np.zeros(0)
@@ -35,6 +41,7 @@ class LiveSurroundings:
 
     def note(self, telemetry: Telemetry, truth: TruthSample | None, scan: LidarScan | None) -> None:
         """Take in a tick; returns at once."""
+        self._ground.note(telemetry)
         if is_usable(scan):
             self._sweep = (estimated_q(telemetry) if truth is None else truth.q, scan)
         if truth is None or self._wheeled is None:
@@ -50,7 +57,7 @@ class LiveSurroundings:
         found: dict[str, Any] = {}
         sweep, self._sweep = self._sweep, None
         if sweep is not None:
-            found["sweep"] = sweep_points(*sweep, self._mount)
+            found["sweep"] = sweep_points(*sweep, self._mount, self._turn)
         if truth is not None and self._wheeled is not None and np.isfinite(truth.leader[0]):
             found["leader"] = truth.leader
             found["turned"], found["steered"] = self._turned, self._steering(truth)
@@ -64,7 +71,7 @@ class LiveSurroundings:
             left = 0 if report is None else report.waypoints_left
             found["waypoints"] = guide.waypoints
             found["reached"] = max(0, len(guide.waypoints) - left)
-        return found
+        return found | self._ground.state(telemetry)
 
     def _steering(self, truth: TruthSample) -> FloatArray:
         """(k,) rad, how the wheels stand, from the way between the states drawn."""
@@ -79,18 +86,19 @@ class LiveSurroundings:
         return self._steered
 
 
-def sweep_points(q: FloatArray, scan: LidarScan, mount: FloatArray) -> list[int]:
+def sweep_points(q: FloatArray, scan: LidarScan, mount: FloatArray, turn: FloatArray) -> list[int]:
     """(3 k,) mm, ends of some rays of a sweep, one after the other, in the frame of `q`.
 
     Args:
         q: (7,) or longer: trunk position (m) and quaternion.
         scan: the sweep.
         mount: (3,) m, the LIDAR in the base frame.
+        turn: (3, 3) rotation from the LIDAR's frame to the base frame.
     """
     every = stride_for(len(scan.bearing), RAYS)
     distance, bearing = scan.distance[::every], scan.bearing[::every]
     met = np.isfinite(distance) & (distance > 0.02)
     rays = np.column_stack([np.cos(bearing[met]), np.sin(bearing[met]), np.zeros(met.sum())])
-    points = q[:3] + (mount + distance[met, None] * rays) @ rotation_from_quaternion(q[3:7]).T
+    points = q[:3] + (mount + distance[met, None] * rays @ turn.T) @ rotation_from_quaternion(q[3:7]).T
     millimetres: list[int] = np.round(1e3 * points).astype(int).ravel().tolist()
     return millimetres

@@ -11,6 +11,7 @@ import numpy as np
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.settings import build
 from bluefoot_mpc.terrain.cost import CostConfig, cost_tensor, yaw_index, yaw_of
+from bluefoot_mpc.terrain.plan_config import PlanConfig
 from bluefoot_mpc.types import FloatArray
 from bluefoot_mpc.viz.crossing_series import CrossingSeries, MapAt
 from bluefoot_mpc.viz.packing import pack
@@ -38,11 +39,11 @@ def cost_config(config: Mapping[str, Any]) -> CostConfig:
     """
     table = config.get("control", {}).get("crossing", {}).get("plan", {}).get("cost")
     if table is None:
-        return CostConfig()
+        return PlanConfig().cost
     try:
         return build(CostConfig, table, "control.crossing.plan.cost")
     except ConfigurationError:
-        return CostConfig()
+        return PlanConfig().cost
 
 
 def cost_slices(crossing: CrossingSeries, config: CostConfig) -> Panel | None:
@@ -75,7 +76,8 @@ def cost_slices(crossing: CrossingSeries, config: CostConfig) -> Panel | None:
         key="cost", title="Cost of standing", data=steps[-1].data, wide=True, time=False, steps=steps,
         height=round(float(np.clip(height, 240, 620))), layout=_layout(low, high, names, share),
         caption="Cost of standing with the trunk over each cell, for three headings, on a logarithmic scale, "
-        "computed again from the map; grey: a foot would be on unknown ground. Pink: the planned way.",
+        "computed again from the cells of the map; grey: a foot would be on unknown ground. Pink: the "
+        "planned way, whose feet may step beside their cells.",
     )  # fmt: skip
 
 

@@ -36,10 +36,11 @@ class GroundView {
   }
   // One small square for each known cell, at its height.
   setMap(map) {
-    if (map === this.drawn) return;
+    if (map === this.drawn || (map && this.drawn && map.number && map.number === this.drawn.number)) return;
     this.drawn = map;
     this.map.visible = false;
     if (!map) return;
+    if (map.span) this.data.span = map.span;
     const T = MeshCat.THREE, heights = GroundView.whole(map.heights), known = [];
     heights.forEach((height, k) => { if (height !== -32768) known.push(k); });
     const [x0, y0, yaw] = map.frame, c = Math.cos(yaw), s = Math.sin(yaw), { cell, columns } = map;

@@ -35,6 +35,7 @@
   const recording = new LiveRecording(JSON.parse(document.getElementById("run-data").textContent));
   const plan = new PlanView(role("plan"), recording);
   const view = openView(role("view"), recording);
+  if (view) view.shown.map = true;
   wireControls(root, view, () => draw());
   let state = null, fresh = false;
 
@@ -44,6 +45,12 @@
     if (state.leader && view.leader) view.leader.place(state.leader, state.turned, state.steered);
     if (state.sweep) { swept = state.time; view.sweeps.put(state.sweep, view.shown.sweep); }
     if (state.time - swept > 0.5 || state.time < swept || !view.shown.sweep) view.sweeps.points.visible = false;
+    const { ground } = view;
+    if (state.map) ground.setMap(state.map);
+    if (state.route) ground.setRoute(state.route);
+    ground.map.visible = view.shown.map && Boolean(ground.drawn);
+    ground.route.visible = view.shown.path && Boolean(ground.planned);
+    ground.setAims(state.aims || []);
     view.goals.place(state.waypoints || [], state.reached || 0, state.marker || null);
   }
 
@@ -58,7 +65,7 @@
     role("state").textContent = `${state.mode} · roll ${degrees(roll)} · pitch ${degrees(pitch)}`;
     role("clock").textContent = `${state.time.toFixed(1)} s`;
     role("command").textContent = state.mode === "walk"
-      ? `${state.guided ? `led by: ${state.guided}${state.reason ? ` (${state.reason})` : ""} · ` : ""}${state.gait}, ${mm(forward)} mm/s forward, ${mm(left)} mm/s left, ${degrees(turn)}/s left turn` : state.mode;
+      ? `${state.phase ? `${state.phase}${state.reason ? ` (${state.reason})` : ""} · ` : ""}${state.guided ? `led by: ${state.guided}${state.reason ? ` (${state.reason})` : ""} · ` : ""}${state.gait}, ${mm(forward)} mm/s forward, ${mm(left)} mm/s left, ${degrees(turn)}/s left turn` : state.mode;
     if (state.events.length) role("event").textContent = state.events[state.events.length - 1];
   }
 
@@ -72,7 +79,9 @@
     socket.onmessage = (message) => {
       const next = JSON.parse(message.data);
       if (state && next.time < state.time) recording.count = 0;  // a new run
+      if (next.map) role("map-choice").hidden = false;
       if (fresh && state && state.sweep && !next.sweep) next.sweep = state.sweep;  // not drawn yet
+      if (fresh && state && state.map && !next.map) { next.map = state.map; next.route = state.route; }
       state = next;
       recording.add(state);
       fresh = true;
