@@ -19,6 +19,8 @@ AHEAD = 0.05
 """s that a scan's time stamp may lie ahead of the frame's."""
 OLD = 0.3
 """s; an older scan is of a pose that is no longer known."""
+MOST_SLACK = math.radians(0.7)
+"""Rad off a level, at most, where the next one is far."""
 OUT_OF_REACH = 3
 """Levels in a row that were not reached, after which the rest is taken to be out of reach."""
 
@@ -169,6 +171,9 @@ class Sweeper:
         if scan is None:
             return None
         self._fault = _unusable(scan, time, self._scan_time)
+        if not self._fault and self._stage is _Stage.LEVELS and not np.isfinite(scan.distance).any():
+            # With the trunk level there may be nothing in view; with the nose down there is the ground.
+            self._fault = "no echo in the whole scan"
         if self._fault:
             return None
         self._scan_time, self._heard = scan.time, time
@@ -209,7 +214,7 @@ class Sweeper:
     def _allowed(self) -> float:
         """How far (rad) a scan may be off the level: those far apart need not be met as well."""
         gaps = np.diff(self._levels[max(self._level - 1, 0) : self._level + 2])
-        return max(self._tolerance, self._config.slack * float(gaps.min()))
+        return max(self._tolerance, min(self._config.slack * float(gaps.min()), MOST_SLACK))
 
     def _next(self, time: float) -> None:
         """On to the next level, or back."""
@@ -257,6 +262,4 @@ def _unusable(scan: LidarScan, time: float, before: float) -> str:
 def _unusable_rays(bearing: FloatArray, distance: FloatArray) -> str:
     if bearing.shape != distance.shape or bearing.ndim != 1:
         return "bearings and distances do not match"
-    if not np.isfinite(bearing).all():
-        return "bearings are not numbers"
-    return "" if np.isfinite(distance).any() else "no echo in the whole scan"
+    return "" if np.isfinite(bearing).all() else "bearings are not numbers"
