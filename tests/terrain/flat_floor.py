@@ -42,7 +42,7 @@ def floor_scan(
 def sweep_of(
     mounts: SensorMounts, seed: int = 0, pitches: FloatArray | None = None, tilt_error: float = 0.0
 ) -> list[PosedScan]:
-    """A sweep by a LIDAR that is really mounted so, seen by a robot that errs in roll by `tilt_error` (rad)."""
+    """A sweep by a LIDAR that is mounted so, seen by a robot that errs in roll by `tilt_error` (rad)."""
     rng = np.random.default_rng(seed)
     looks = []
     for pitch in np.radians(np.linspace(11.0, 31.0, 40)) if pitches is None else pitches:
