@@ -131,3 +131,36 @@ def test_picture_that_cannot_be_written(capfd, tmp_path):
     status, data = run(capfd, "room", "--picture", str(tmp_path / "file" / "w.png"))
     assert status == 2
     assert "cannot write" in data["error"]
+
+
+@pytest.mark.parametrize(("kind", "of"), [("rubble", "blocks"), ("stones", "1 end, 1 start,")])
+def test_rough_ground_is_told_with_its_heights(capsys, kind, of):
+    assert main(["world", kind, "--seed", "2", "--set", "sim.world.terrain_height=0.03"]) == 0
+    text = capsys.readouterr().out
+    assert of in text
+    assert "rough from x = 0.4" in text
+    assert "walk in it: bluefoot run rough" in text
+    assert f"--world {kind} --seed 2 --set sim.world.terrain_height=0.03" in text
+    assert "warning" not in text
+
+
+def test_rough_ground_is_written_and_drawn(capfd, tmp_path):
+    plan, picture, page = (tmp_path / name for name in ("own.toml", "own.png", "own.html"))
+    assert run(capfd, "gap", "--out", str(plan), "--picture", str(picture))[0] == 0
+    assert read_plan(plan).floor == -0.08
+    assert picture.stat().st_size > 5_000
+    assert run(capfd, str(plan), "--picture", str(page))[0] == 0
+    assert "height (mm)" in page.read_text()
+
+
+@pytest.mark.parametrize(
+    "words", [["--set", "sim.world.name=gap"], ["--set", "control.x=1"], ["--set", "sim=1"]]
+)
+def test_only_the_world_is_set(capsys, words):
+    assert main(["world", "rubble", *words]) == 2
+    assert "--set takes values of the world only" in capsys.readouterr().err
+
+
+def test_a_figure_that_means_nothing_in_the_world_is_refused(capsys):
+    assert main(["world", "rubble", "--set", "sim.world.gap=0.1"]) == 2
+    assert "take one of: gap, stones" in capsys.readouterr().err
