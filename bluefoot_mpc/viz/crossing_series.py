@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeGuard
 
 import numpy as np
@@ -48,7 +48,7 @@ class Swing:
         start: first tick of the swing.
         landed: tick on which the foot stands again.
         chosen: (3,) m, where it was to land, odometry frame; NaN where nothing was chosen.
-        landing: (3,) m, where it landed as estimated, odometry frame.
+        landing: (3,) m, where its lowest point landed as estimated, odometry frame.
     """
 
     leg: int
@@ -68,7 +68,8 @@ class CrossingSeries:
     """Crossing of rough ground in one run, n ticks; NaN where nothing was reported.
 
     World and odometry frame both begin under the robot's first stance; what lies between them is the
-    drift of the estimate.
+    drift of the estimate. Heights in the odometry frame count from the ground there, as in the world; the
+    robot's own count from the middles of the balls that its feet end in.
 
     Attributes:
         time: (n,) s, from the first tick.
@@ -89,7 +90,7 @@ class CrossingSeries:
         turn: (n, 3, 3) rotation from the odometry frame to the world that lays the estimated trunk over the
             true one; unity without truth.
         feet: (n, 4, 3) m, lowest points of the feet in world: truth, else the estimate.
-        feet_estimate: (n, 4, 3) m, as estimated, odometry frame.
+        feet_estimate: (n, 4, 3) m, lowest points as estimated, odometry frame.
         swings: every swing of every leg, in order.
         maps: in order.
         routes: in order.
@@ -156,12 +157,13 @@ def extract_crossing(run: RunData, series: RunSeries, foot_radius: float) -> Cro
     reports = [record.crossing for record in telemetry]
     if not any(report is not None for report in reports):
         return None
+    feet_estimate = np.array([estimated_feet(record) for record in telemetry]) - (0.0, 0.0, foot_radius)
+    rise = datum(feet_estimate[0])
+    feet_estimate -= rise
     estimate = np.array([estimated_q(record)[:7] for record in telemetry])
-    below = np.array([0.0, 0.0, foot_radius if series.has_truth else 0.0])
     turns = [_turn(true[3:7], believed[3:7]) for true, believed in zip(series.q, estimate, strict=True)]
-    feet_estimate = np.array([estimated_feet(record) for record in telemetry])
-    start = telemetry[0].time
-    points, point_time, seen = _cloud(telemetry, start)
+    estimate[:, :3] -= rise
+    points, point_time, seen = _cloud(telemetry)
     return CrossingSeries(
         time=series.time,
         has_truth=series.has_truth,
@@ -176,18 +178,38 @@ def extract_crossing(run: RunData, series: RunSeries, foot_radius: float) -> Cro
         drift=_reported(reports, "drift")[:, 0],
         sweeps=max(report.sweeps for report in reports if report is not None),
         goal=_goal(telemetry),
-        position=series.q[:, :3],
+        position=series.q[:, :3] if series.has_truth else estimate[:, :3],
         estimate=estimate[:, :3],
         turn=np.array(turns),
-        feet=series.feet - below,
+        feet=series.feet - (0.0, 0.0, foot_radius) if series.has_truth else feet_estimate,
         feet_estimate=feet_estimate,
-        swings=_swings(series, reports, feet_estimate),
-        maps=tuple(MapAt(k, r.ground) for k, r in enumerate(reports) if r is not None and is_map(r.ground)),
+        swings=_swings(series, reports, feet_estimate, rise),
+        maps=_maps(reports, rise),
         routes=tuple(RouteAt(k, r.route) for k, r in enumerate(reports) if r is not None and is_route(r)),
-        points=points,
-        point_time=point_time,
+        points=points - rise,
+        point_time=point_time - telemetry[0].time,
         seen=seen,
     )
+
+
+def datum(feet: FloatArray) -> FloatArray:
+    """(3,) m, straight up: from the zero of estimated heights to the ground at the start.
+
+    Args:
+        feet: (4, 3) m, lowest points of the standing feet, odometry frame.
+    """
+    height = float(feet[:, 2].mean())
+    return np.array([0.0, 0.0, height if np.isfinite(height) else 0.0])
+
+
+def raised(ground: HeightMap, rise: FloatArray) -> HeightMap:
+    """A map with its heights counted from the ground at the start; `rise` as `datum` gives it."""
+    return replace(ground, pose=ground.pose - (0.0, 0.0, rise[2], 0.0))
+
+
+def _maps(reports: Sequence[CrossingReport | None], rise: FloatArray) -> tuple[MapAt, ...]:
+    new = [(k, report.ground) for k, report in enumerate(reports) if report is not None]
+    return tuple(MapAt(k, raised(ground, rise)) for k, ground in new if is_map(ground))
 
 
 def _turn(true: FloatArray, believed: FloatArray) -> FloatArray:
@@ -222,9 +244,9 @@ def _reported(reports: Sequence[CrossingReport | None], name: str, width: int = 
     return np.array([nothing if r is None else np.reshape(getattr(r, name), width) for r in reports])
 
 
-def _cloud(telemetry: Sequence[Telemetry], start: float) -> tuple[FloatArray, FloatArray, int]:
+def _cloud(telemetry: Sequence[Telemetry]) -> tuple[FloatArray, FloatArray, int]:
     """Points (m, 3) with their times (m,), evenly thinned, and how many there were."""
-    found = [(r.time - start, r.crossing.points) for r in telemetry if r.crossing is not None]
+    found = [(r.time, r.crossing.points) for r in telemetry if r.crossing is not None]
     pieces = [(time, points[np.isfinite(points).all(axis=1)]) for time, points in found if len(points)]
     if not pieces:
         return np.zeros((0, 3)), np.zeros(0), 0
@@ -240,7 +262,7 @@ def _cloud(telemetry: Sequence[Telemetry], start: float) -> tuple[FloatArray, Fl
 
 
 def _swings(
-    series: RunSeries, reports: Sequence[CrossingReport | None], feet: FloatArray
+    series: RunSeries, reports: Sequence[CrossingReport | None], feet: FloatArray, rise: FloatArray
 ) -> tuple[Swing, ...]:
     """Every swing that ended, in the order of the landings."""
     found: list[Swing] = []
@@ -257,6 +279,6 @@ def _swings(
             landed = min(n - 1, end + (int(down[0]) if len(down) else 0) + _SETTLES)
             aim = aims[start:end]
             aim = aim[np.isfinite(aim[:, :2]).all(axis=1)]
-            chosen = aim[-1] if len(aim) else np.full(3, np.nan)
+            chosen = aim[-1] - rise if len(aim) else np.full(3, np.nan)
             found.append(Swing(leg, start, landed, chosen, feet[landed, leg]))
     return tuple(sorted(found, key=lambda swing: (swing.landed, swing.leg)))

@@ -57,8 +57,9 @@ class LiveView:
     def __init__(self, robot: RobotModel, stage: Stage | None = None) -> None:
         self.url = ""
         self._radius = robot.parameters.legs.foot_radius
+        stage = replace(stage or Stage(), foot_radius=self._radius)
         mounts = robot.parameters.sensors
-        self._around = LiveSurroundings(stage or Stage(), mounts.lidar, mounts.lidar_rotation)
+        self._around = LiveSurroundings(stage, mounts.lidar, mounts.lidar_rotation)
         self._newest: tuple[Telemetry, TruthSample | None] | None = None
         self._wake = threading.Event()
         self._ending = False

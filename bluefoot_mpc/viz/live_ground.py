@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from bluefoot_mpc.types import FloatArray, HeightMap, Telemetry
-from bluefoot_mpc.viz.crossing_series import MapAt, is_map, is_route
+from bluefoot_mpc.viz.crossing_series import MapAt, datum, is_map, is_route, raised
 from bluefoot_mpc.viz.plots_terrain import span_of
+from bluefoot_mpc.viz.series import estimated_feet
 from bluefoot_mpc.viz.stage_ground import map_data, route_points
 
 AGAIN = 2.0
@@ -16,9 +17,15 @@ AGAIN = 2.0
 
 
 class LiveGround:
-    """Keeps map and way from tick to tick; `note` is for every tick, `state` for those drawn."""
+    """Keeps map and way from tick to tick; `note` is for every tick, `state` for those drawn.
 
-    def __init__(self) -> None:
+    Args:
+        foot_radius: m, of the balls that the feet end in.
+    """
+
+    def __init__(self, foot_radius: float) -> None:
+        self._below = np.array([0.0, 0.0, foot_radius])
+        self._rise: FloatArray | None = None
         self._map: HeightMap | None = None
         self._route: FloatArray | None = None
         self._number = 0
@@ -29,8 +36,10 @@ class LiveGround:
         report = telemetry.crossing
         if report is None:
             return
+        if self._rise is None:
+            self._rise = datum(estimated_feet(telemetry) - self._below)
         if is_map(report.ground):
-            self._map = report.ground
+            self._map = raised(report.ground, self._rise)
             self._number += 1
         if is_route(report):
             self._route = report.route[:, :3]
@@ -41,7 +50,8 @@ class LiveGround:
         report, number = telemetry.crossing, self._number
         if report is None:
             return {}
-        aims = [row if np.isfinite(row).all() else None for row in report.footholds]
+        rise = np.zeros(3) if self._rise is None else self._rise
+        aims = [row - rise if np.isfinite(row).all() else None for row in report.footholds]
         found: dict[str, Any] = {"phase": str(report.phase), "reason": report.reason, "aims": aims}
         last, when = self._told
         if number and (number != last or not 0.0 <= telemetry.time - when < AGAIN):

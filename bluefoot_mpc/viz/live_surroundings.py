@@ -32,7 +32,7 @@ class LiveSurroundings:
         self._wheeled = READY[stage.leader]() if stage.leader in READY else None
         self._mount = np.array(mount)
         self._turn = np.eye(3) if turn is None else turn
-        self._ground = LiveGround()
+        self._ground = LiveGround(stage.foot_radius)
         self._sweep: tuple[FloatArray, LidarScan] | None = None
         self._time: float | None = None
         self._turned = np.zeros(0)

@@ -35,6 +35,8 @@ DRIFT = 0.002
 GOAL = np.array([0.6, 0.0])
 CELL = 0.02
 LIFT = 0.03
+RADIUS = 0.008
+"""m, of the balls that the feet end in: the estimate counts heights from their middles."""
 BEARING = np.radians(np.linspace(-119.9, 119.9, 171))
 LIDAR = np.array([0.04, 0.0, 0.127])
 
@@ -104,10 +106,10 @@ def _think(
 ) -> None:
     record, truth = run.telemetry[k], run.truth[k]
     time = record.time
-    away = np.array([0.0, DRIFT * time, 0.0])
+    away = np.array([0.0, DRIFT * time, -RADIUS])
     estimate = dataclasses.replace(
         record.estimate, position=truth.q[:3] + away, rpy=rpy, quaternion=quaternion_from_rpy(rpy),
-        foot_position_in_base=(truth.foot_position - [0, 0, 0.008] - truth.q[:3]) @ rotation_from_rpy(rpy),
+        foot_position_in_base=(truth.foot_position - truth.q[:3]) @ rotation_from_rpy(rpy),
     )  # fmt: skip
     phase = _phase(time, blocked)
     report, motion = None, record.motion
@@ -133,7 +135,7 @@ def _think(
 
 def _next_landing(run: RunData, k: int) -> FloatArray:
     """(4, 3) m, where the feet are to come down: some millimetres ahead of where they are."""
-    return run.truth[k].foot_position - [0, 0, 0.008] + np.array([0.006, 0.0, 0.0])
+    return run.truth[k].foot_position - [0, 0, RADIUS] + np.array([0.006, 0.0, 0.0])
 
 
 def _scan(run: RunData, k: int, rpy: FloatArray, ground: Relief, rng: np.random.Generator) -> FloatArray:
@@ -169,7 +171,7 @@ def _map(
     height[30:, 50:] = np.nan
     known = np.isfinite(height)
     return HeightMap(
-        time=time, cell=CELL, pose=np.array([*corner, 0.0, 0.0]), height=height,
+        time=time, cell=CELL, pose=np.array([*corner, away[2], 0.0]), height=height,
         confidence=np.where(known, rng.uniform(0.6, 1.0, (50, 70)), 0.0),
     )  # fmt: skip
 
