@@ -42,6 +42,9 @@ class PlacerConfig:
     width: float = 0.036  # m, of the way that a swing must clear
     decided: float = 0.06  # s before lift-off, from which the choice stays
     follow: float = 0.3  # s, time constant of the shift between odometry and gait
+    learn: float = 0.3  # share of a foot's miss by which its next goals are moved the other way
+    learn_after: float = 0.1  # s after a landing, when its miss is measured
+    learn_most: float = 0.012  # m, largest such move
     level_time: float = 0.4  # s, with which the trunk follows the mean height of the feet
     slow: float = 0.060  # m behind its place, from which a standing foot slows the walk
     stop: float = 0.085  # m behind its place, at which it stops it
@@ -81,6 +84,8 @@ class FootPlacer:
         self._contacts.reset()
         self._active = False
         self._turn, self._shift = 0.0, 0j  # odometry to the gait's world
+        self._bias = [0j] * 4  # m, ahead and left, by which each foot misses its places on the whole
+        self._landed = [math.inf] * 4  # s since it landed
         self._rise = math.nan  # m, heights of the gait over those of the map
         self._next = 0
         self.footholds = np.full((4, 3), np.nan)
@@ -88,6 +93,7 @@ class FootPlacer:
         self._reasons = [""] * 4
         self.waiting = ""
         self.level = 0.0
+        self._aim = np.full((4, 3), np.nan)  # where feet in the air go to
         self.pace = 1.0
 
     def step(self, ground: Ground | None, estimate: BodyState, gait: Gait, dt: float) -> None:
@@ -106,14 +112,32 @@ class FootPlacer:
             return
         if not estimate.healthy:
             return
-        places = estimate.position + estimate.foot_position_in_base @ rotation_from_rpy(estimate.rpy).T
+        rotation = rotation_from_rpy(estimate.rpy)
+        places = estimate.position + estimate.foot_position_in_base @ rotation.T
         self._contacts.step(gait, estimate.contact, places[:, 2], dt)
+        self._learn(places, float(estimate.rpy[2]), gait, dt)
         self._align(ground, places, estimate.contact, gait, dt)
         self._active = True
         self._next = (self._next + 1) % 4
         self._plan(ground, places, gait, self._next)
         self.waiting = next((reason for reason in self._reasons if reason), "")
         self._follow_feet(gait, dt)
+
+    def _learn(self, places: FloatArray, yaw: float, gait: Gait, dt: float) -> None:
+        """Learn by how much each foot misses its places: soft legs do so much alike at every step."""
+        config = self._config
+        for leg, foot in enumerate(gait.state.feet):
+            before = self._landed[leg]
+            if foot.swinging:
+                self._aim[leg] = self.footholds[leg]
+            self._landed[leg] = 0.0 if foot.swinging else before + dt
+            if not before < config.learn_after <= self._landed[leg]:
+                continue
+            x, y, _ = (places[leg] - self._aim[leg]).tolist()
+            miss = complex(x, y) * cmath.rect(1.0, -yaw)
+            if abs(miss) < 2.0 * config.learn_most:  # written so that no number is no lesson
+                bias = self._bias[leg] + config.learn * miss
+                self._bias[leg] = bias * min(1.0, config.learn_most / max(abs(bias), 1e-9))
 
     def _align(
         self, ground: Ground, places: FloatArray, contact: BoolArray, gait: Gait, dt: float
@@ -127,8 +151,9 @@ class FootPlacer:
         told = np.array([feet[leg].anchor for leg in standing])
         turn = cmath.phase(complex(((told - told.mean()) * np.conj(seen - seen.mean())).sum()))
         share = 1.0 if not self._active else min(1.0, dt / self._config.follow)
+        middle = complex(seen.mean())
         self._turn += share * math.remainder(turn - self._turn, 2.0 * math.pi)
-        shift = complex(told.mean() - cmath.rect(1.0, self._turn) * seen.mean())
+        shift = complex(told.mean()) - cmath.rect(1.0, self._turn) * middle
         self._shift += share * (shift - self._shift)
         rises = [feet[leg].z - height_around(ground, places[leg, :2]) for leg in standing]
         known = [rise for rise in rises if math.isfinite(rise)]
@@ -175,10 +200,11 @@ class FootPlacer:
             gait.plan_step(leg, foot.anchor, foot.z, foot.z + config.least_lift)
             return
         goal = self._to_gait(choice.place[None])[0]
+        bias = self._bias[leg] * cmath.rect(1.0, state.pose.yaw)
         high = highest_between(ground, places[leg, :2], choice.place[:2], config.width) + self._rise
         top = max(high + config.clearance, foot.z + config.least_lift, float(goal[2]) + config.least_lift)
         self.lift[leg] = top - foot.z
-        gait.plan_step(leg, complex(goal[0], goal[1]), float(goal[2]), top)
+        gait.plan_step(leg, complex(goal[0], goal[1]) - bias, float(goal[2]), top)
 
     def _held(self, gait: Gait, leg: int, places: FloatArray, pose: VirtualPose) -> BoolArray:
         """(k,) whether the leg holds (k, 3) places of the gait's world while the virtual robot is at `pose`."""
