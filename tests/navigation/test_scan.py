@@ -104,3 +104,16 @@ def test_a_good_sweep_after_a_useless_one_is_of_use() -> None:
     made = reader()
     assert isinstance(made.read(replace(SWEEP, bearing=BEARINGS * np.nan), body_state(1.0)), str)
     assert isinstance(made.read(SWEEP, body_state(1.0)), LevelScan)
+
+
+def test_a_sensor_that_is_turned_on_the_trunk_gives_the_same_points_as_a_trunk_that_is_tilted() -> None:
+    pitch = 0.10
+    mounts = replace(MOUNTS, lidar=(0.0, 0.0, 0.0), lidar_rpy_deg=(0.0, math.degrees(pitch), 0.0))
+    turned = ScanReader(ScanConfig(), mounts).read(SWEEP, body_state(1.0))
+    level = replace(mounts, lidar_rpy_deg=(0.0, 0.0, 0.0))
+    tilted = ScanReader(ScanConfig(), level).read(SWEEP, body_state(1.0, tilt=(0.0, pitch)))
+    assert isinstance(turned, LevelScan)
+    assert isinstance(tilted, LevelScan)
+    np.testing.assert_allclose(turned.points, tilted.points, atol=1e-12)
+    np.testing.assert_array_equal(turned.hit, tilted.hit)
+    assert not turned.hit.all()

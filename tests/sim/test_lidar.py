@@ -1,6 +1,7 @@
 """The simulated LIDAR in a room whose walls are known."""
 
 import math
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -205,3 +206,23 @@ def test_the_seed_decides_and_reset_begins_anew(world, robot):
 def test_impossible_errors_are_refused():
     with pytest.raises(ConfigurationError, match="dropouts"):
         LidarConfig(dropouts=1.5)
+
+
+def test_a_sensor_that_is_mounted_askew_looks_where_it_is_turned(world, robot):
+    place(world)
+    turned = replace(PERFECT, mount_error_deg=(0.0, 12.0, 0.0))
+    body = (world.model, world.data, world.trunk)
+    by_error = RaycastLidar(*body, robot.parameters.sensors, turned).look(bearings())
+    told = replace(robot.parameters.sensors, lidar_rpy_deg=(0.0, 12.0, 0.0))
+    by_parameter = RaycastLidar(*body, told, PERFECT).look(bearings())
+    np.testing.assert_allclose(by_error, by_parameter, atol=1e-9)
+    lens = 0.25 + robot.parameters.sensors.lidar[2]
+    assert by_error[FRONT] == pytest.approx(lens / math.sin(math.radians(12.0)), abs=1e-9)
+
+
+@pytest.mark.parametrize("wrong", [(0.0, 40.0, 0.0), (math.nan, 0.0, 0.0)])
+def test_impossible_mountings_are_refused(robot, wrong):
+    with pytest.raises(ConfigurationError, match="mount_error_deg"):
+        LidarConfig(mount_error_deg=wrong)
+    with pytest.raises(ConfigurationError, match="lidar_rpy_deg"):
+        replace(robot.parameters.sensors, lidar_rpy_deg=wrong)
