@@ -5,8 +5,8 @@
 The thesis' table: four starts by four windows, here on several grounds and over seeds, with A* beside it.
 Every entry is the cost of the window's way over that of the cheapest way on the same graph, as the mean over
 starts and seeds. Starts from which some window got stuck (no finite cell to step to) are left out of the
-means of all windows and counted. The table comes twice: with windows that aim at the cheapest way, and with such as
-aim at the cheapest cell, as in the thesis. `--worlds` adds the true heights of the simulator's worlds.
+means of all windows and counted. The table comes twice: with windows that aim at the cheapest way, and with
+such as aim at the cheapest cell, as in the thesis. `--worlds` adds true heights of the simulator's worlds.
 
 Times are processor times of one thread, medians, taken in turns.
 """

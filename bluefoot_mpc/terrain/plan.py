@@ -40,7 +40,11 @@ class Route:
 
 
 def plan_route(
-    ground: HeightMap, start: tuple[float, float, float], goal: tuple[float, float], config: PlanConfig
+    ground: HeightMap,
+    start: tuple[float, float, float],
+    goal: tuple[float, float],
+    config: PlanConfig,
+    quality: FloatArray | None = None,
 ) -> Route:
     """The way from where the robot stands towards a goal.
 
@@ -53,6 +57,7 @@ def plan_route(
         start: x, y (m) and yaw (rad) of the trunk, odometry frame.
         goal: x, y (m), odometry frame.
         config: limits and weights.
+        quality: (n, m) 0..1, how well a foot stands on the map's cells; None where that was not rated.
 
     Returns:
         The way, or why there is none.
@@ -63,11 +68,11 @@ def plan_route(
         standing = np.array([start], dtype=np.float64)
         return Route(poses=standing, cost=0.0, planner=config.planner, feasible=True, reason="at the goal",
                      reaches_goal=True)  # fmt: skip
-    grid = planning_grid(ground, start, goal, config)
+    grid = planning_grid(ground, start, goal, config, quality)
     blind = grid.unknown_feet(grid.start)
     if blind:
         return _none(config, f"the ground under {', '.join(blind)} at the start is unknown: sweep again")
-    ahead = reachable(grid.cost, grid.start)
+    ahead = reachable(grid.cost[:, : grid.goal_j + 1], grid.start)
     columns = np.flatnonzero(ahead.any(axis=(0, 2)))
     last = int(columns[-1]) if columns.size else grid.start[1]
     if last < grid.goal_j and (last - grid.start[1]) * grid.map.cell < config.least_advance:

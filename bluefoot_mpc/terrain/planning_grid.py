@@ -61,7 +61,11 @@ class PlanningGrid:
 
 
 def planning_grid(
-    ground: HeightMap, start: tuple[float, float, float], goal: tuple[float, float], config: PlanConfig
+    ground: HeightMap,
+    start: tuple[float, float, float],
+    goal: tuple[float, float],
+    config: PlanConfig,
+    quality: FloatArray | None = None,
 ) -> PlanningGrid:
     """Lay a grid from a start to a goal.
 
@@ -72,11 +76,12 @@ def planning_grid(
         start: x, y (m) and yaw (rad), odometry frame.
         goal: x, y (m), odometry frame; not at the start.
         config: sizes and limits.
+        quality: (n, m) 0..1, how well a foot stands on the map's cells; None where that was not rated.
     """
     away, far = math.atan2(goal[1] - start[1], goal[0] - start[0]), math.dist(start[:2], goal)
     steps = max(math.ceil(far / config.cell - 1e-9), 1)
     frame, cell, goal_j = _frame(ground, (start[0], start[1], away), far / steps, steps, config)
-    near = treads(ground.height, ground.cell, config.treads)
+    near = treads(ground.height, ground.cell, config.treads, quality)
     found, under = _sampled(ground, near, frame, config)
     turn = wrap_angle(start[2] - away)
     weights = replace(config.cost, yaw_range=max(config.cost.yaw_range, _reach_of(turn, config.cost.yaws)))
