@@ -50,7 +50,9 @@ def read_plan(path: Path) -> WorldPlan:
             " bounds = [-1.0, -2.0, 5.0, 2.0]"
         )
     if isinstance(table["solids"], list):
-        table["solids"] = [_standing(solid) for solid in table["solids"]]
+        floor = table.get("floor")
+        level = float(floor) if isinstance(floor, int | float) else 0.0  # a wrong one is told later
+        table["solids"] = [_standing(solid, level) for solid in table["solids"]]
     try:
         _require_known(table)
         plan = build(WorldPlan, table)
@@ -75,7 +77,7 @@ def write_plan(plan: WorldPlan, path: Path) -> None:
         raise ConfigurationError(f"cannot write {path}: {error.strerror or error}") from error
 
 
-def _standing(solid: Any) -> Any:
+def _standing(solid: Any, floor: float) -> Any:
     """A solid's table; without a height above the floor it stands on it."""
     if not isinstance(solid, Mapping) or "z" in solid:
         return solid
@@ -83,7 +85,7 @@ def _standing(solid: Any) -> Any:
     match solid.get("size"):
         case [_, _, float() | int() as value]:
             height = value
-    return {**solid, "z": 0.5 * height}
+    return {**solid, "z": floor + 0.5 * height}
 
 
 def _require_start(plan: WorldPlan) -> None:

@@ -247,3 +247,15 @@ def test_a_file_without_even_ground_to_start_on_is_refused(tmp_path, old, new, c
     file.write_text(text.replace(old, new))
     with pytest.raises(ConfigurationError, match=cause):
         read_plan(file)
+
+
+def test_what_has_no_height_in_a_file_stands_on_the_floor(tmp_path):
+    file = tmp_path / "own.toml"
+    start = slab(name="start", x=-0.2, size=(1.2, 2.0, 0.08))
+    write_plan(
+        WorldPlan(name="own", seed=0, bounds=(-1.0, -1.0, 2.0, 1.0), solids=(start,), floor=-0.08), file
+    )
+    text = file.read_text()
+    assert "z = -0.04\n" in text
+    file.write_text(text.replace("z = -0.04\n", ""))
+    assert read_plan(file).solids[0].z == -0.04
