@@ -27,7 +27,7 @@ edge, higher ones are false."""
 class CellConfig:
     """How a cell's height comes from its points."""
 
-    estimate: Literal["upper", "maximum"] = "upper"  # corrected and trimmed, or as printed
+    estimate: Literal["upper", "mean", "maximum"] = "upper"  # corrected and trimmed; plain; as printed
     points: int = 2  # in a cell that counts as known, at least
     trim: float = 0.2  # share of a cell's points that may be false, above
     noise: float = 0.003  # m, of a height, where the LIDAR's place is not known
@@ -83,7 +83,9 @@ def cell_heights(
     known = count >= config.points
     sigma = np.sqrt(variance)
     used = share
-    if config.estimate == "upper":
+    if config.estimate == "mean":
+        upper = mean
+    elif config.estimate == "upper":
         upper -= sigma * _excess(count, config.trim)
         away = (height - upper[index]) / np.maximum(sigma[index], 1e-9)
         near = (away >= -_BELOW) & (away <= _ABOVE)

@@ -38,12 +38,13 @@ def dilate(height: FloatArray, radius: int) -> FloatArray:
     return np.where(np.isnan(height), np.nan, highest)
 
 
-def median(height: FloatArray, size: int) -> FloatArray:
-    """(n, m) median of the known heights in a square; unknown cells stay unknown.
+def median(height: FloatArray, size: int, spike: float = 0.0) -> FloatArray:
+    """(n, m) heights, spikes replaced by the median of the known ones around; unknown cells stay unknown.
 
     Args:
         height: (n, m) m.
         size: cells along the square's side, odd; 1 leaves the map as it is.
+        spike: m off the median from which a height is replaced; 0 replaces all, the plain filter.
     """
     if size == 1:
         return height.copy()
@@ -55,7 +56,8 @@ def median(height: FloatArray, size: int) -> FloatArray:
     middle = 0.5 * (
         np.take_along_axis(rising, low[None], axis=0)[0] + np.take_along_axis(rising, high[None], axis=0)[0]
     )
-    return np.where(np.isnan(height), np.nan, middle)
+    off = np.abs(height - middle)
+    return np.where(off >= spike, middle, height)  # an unknown cell is off by NaN, and stays
 
 
 def close_gaps(height: FloatArray, width: int, step: float) -> tuple[FloatArray, BoolArray]:

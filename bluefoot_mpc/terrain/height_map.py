@@ -27,6 +27,7 @@ class MapConfig:
     cells: CellConfig = field(default_factory=CellConfig)  # height of a cell from its points
     dilation: int = 0  # cells by which high ground grows
     median: int = 3  # cells along the median filter's square, odd; 1 = none
+    spike: float = 0.010  # m off its square's median from which a height is replaced; 0 = always, as printed
     gap: int = 1  # cells, widest gap between known cells that is bridged
     gap_step: float = 0.010  # m, of height across a gap that is bridged, at most
     gap_confidence: float = 0.3  # of its neighbours' confidence, in a bridged gap
@@ -34,7 +35,7 @@ class MapConfig:
 
     def __post_init__(self) -> None:
         require_positive(cell=self.cell, gap_step=self.gap_step, capacity=self.capacity)
-        require_nonnegative(dilation=self.dilation, gap=self.gap)
+        require_nonnegative(dilation=self.dilation, gap=self.gap, spike=self.spike)
         require_range(0.0, 1.0, gap_confidence=self.gap_confidence)
         require_range(1, 15, median=self.median)
         if self.median % 2 == 0:
@@ -163,7 +164,7 @@ class MapBuilder:
         whole, gaps = close_gaps(raw, config.gap, config.gap_step)
         near = np.fmax.reduce(neighbours(confidence, config.gap), axis=0)
         confidence = np.where(gaps, config.gap_confidence * near, confidence)
-        height = median(dilate(whole, config.dilation), config.median)
+        height = median(dilate(whole, config.dilation), config.median, config.spike)
         return HeightMap(
             time=self._times[-1] if self._times else 0.0, cell=cell, pose=region.pose.copy(), height=height,
             confidence=confidence,

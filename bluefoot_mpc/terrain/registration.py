@@ -14,14 +14,16 @@ import numpy as np
 
 from bluefoot_mpc.geometry import wrap_angle
 from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
-from bluefoot_mpc.terrain.filters import neighbours, slopes
+from bluefoot_mpc.terrain.filters import slopes
 from bluefoot_mpc.terrain.frame import bilinear, centres, to_map
 from bluefoot_mpc.types import FloatArray, HeightMap
 
 _PARAMETERS = 6
 """x, y, yaw, z and the two slopes of a tilt."""
-_CORRELATED = 9.0
-"""Cells that share their noise: both maps were smoothed over squares of three by three."""
+_EVERY = 3
+"""One cell in so many is looked at on the coarse grid."""
+_CORRELATED = 4.0
+"""Cells that share their noise: edges cross several, and both maps cut them into the same squares."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -34,8 +36,8 @@ class Bounds:
     tilt_deg: float = 1.5  # degrees, of the attitude's error between the maps
     overlap: int = 300  # cells that both maps know, at least
     misfit: float = 0.008  # m, of heights; beyond some times this a cell is left out
-    sure: float = 0.003  # m, standard deviation of a shift that is believed
-    sure_deg: float = 0.4  # degrees, of a turn that is believed
+    sure: float = 0.004  # m, standard deviation of a shift that is believed
+    sure_deg: float = 0.5  # degrees, of a turn that is believed
     step: float = 0.010  # m, of the coarse grid
     step_deg: float = 1.5  # degrees
     iterations: int = 8  # of the refinement
@@ -157,8 +159,8 @@ class _Pair:
 
     def __init__(self, old: HeightMap, new: HeightMap) -> None:
         self._old = old
-        self._layers = _smooth_layers(old)
-        layers = _smooth_layers(new)
+        self._layers = _layers(old)
+        layers = _layers(new)
         places = centres(new)
         there = bilinear(old, self._layers, places)
         both = np.isfinite(there).all(axis=-1) & np.isfinite(layers).all(axis=-1)
@@ -199,23 +201,19 @@ class _Pair:
 
     def cost(self, state: FloatArray, limit: float) -> float:
         """m², mean of squared differences about their median, none counted beyond a limit (m)."""
-        back = _back(self.places, state[:3], self.centre)
-        left = self._height - bilinear(self._old, self._layers[..., :1], back)[:, 0]
+        back = _back(self.places[::_EVERY], state[:3], self.centre)
+        left = self._height[::_EVERY] - bilinear(self._old, self._layers[..., :1], back)[:, 0]
         left = left[np.isfinite(left)]
         if len(left) == 0:
             return math.inf
         return float(np.minimum((left - np.median(left)) ** 2, limit**2).mean())
 
 
-def _smooth_layers(ground: HeightMap) -> FloatArray:
-    """(n, m, 3) heights (m, means of known squares) and slopes along the odometry frame's axes."""
-    around = neighbours(ground.height)
-    known = np.isfinite(around)
-    mean = np.where(known, around, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
-    mean = np.where(np.isnan(ground.height), np.nan, mean)
-    forward, left = slopes(mean, ground.cell)
+def _layers(ground: HeightMap) -> FloatArray:
+    """(n, m, 3) heights (m) and slopes along the odometry frame's axes, as they are there."""
+    forward, left = slopes(ground.height, ground.cell)
     c, s = math.cos(ground.pose[3]), math.sin(ground.pose[3])
-    return np.stack((mean + ground.pose[2], c * forward - s * left, s * forward + c * left), axis=-1)
+    return np.stack((ground.height + ground.pose[2], c * forward - s * left, s * forward + c * left), axis=-1)
 
 
 def _back(places: FloatArray, state: FloatArray, centre: FloatArray) -> FloatArray:
