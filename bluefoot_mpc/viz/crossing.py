@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.sim.worlds.heights import Relief
 from bluefoot_mpc.viz.crossing_series import CrossingSeries, extract_crossing
-from bluefoot_mpc.viz.crossing_truth import map_errors, profiles
+from bluefoot_mpc.viz.crossing_truth import Heights, map_errors, profiles
 from bluefoot_mpc.viz.plots import Panel
 from bluefoot_mpc.viz.plots_cloud import cloud_picture
 from bluefoot_mpc.viz.plots_cost import cost_config, cost_slices
@@ -31,6 +34,16 @@ class Crossing:
     panels: tuple[Panel, ...]
 
 
+def _true_heights(run: RunData, mounts: SensorMounts) -> Heights | None:
+    """Of the ground of a run's world; None where its geometry is not known."""
+    plan = known_plan(run, mounts)
+    if plan is not None:
+        return Relief(plan.solids, plan.floor).height
+    world = run.config.get("sim", {}).get("world", {})
+    level = world.get("name", "flat") == "flat" and not world.get("slope_deg")
+    return (lambda places: np.zeros(places.shape[:-1])) if level else None
+
+
 def crossing_of(run: RunData, series: RunSeries, robot: RobotModel) -> Crossing | None:
     """How a run crossed rough ground; None where it did not.
 
@@ -43,15 +56,14 @@ def crossing_of(run: RunData, series: RunSeries, robot: RobotModel) -> Crossing 
     crossing = extract_crossing(run, series, parameters.legs.foot_radius)
     if crossing is None:
         return None
-    plan = known_plan(run, parameters.sensors) if run.truth else None
-    heights = None if plan is None else Relief(plan.solids, plan.floor).height
+    heights = _true_heights(run, parameters.sensors) if series.has_truth else None
     errors = map_errors(crossing, some_maps(crossing.maps), heights)
     panels = [
         height_map(crossing),
         map_quality(crossing, errors),
         cloud_picture(crossing),
         phases_over_time(series, crossing, run.period),
-        side_view(profiles(crossing, heights)),
+        side_view(crossing, profiles(crossing, heights)),
         cost_slices(crossing, cost_config(run.config)),
     ]
     return Crossing(series=crossing, panels=tuple(panel for panel in panels if panel is not None))

@@ -17,6 +17,8 @@ MOST_POINTS = 6000
 """Points of the cloud that a page carries."""
 _FINEST = 0.01
 """m, side of the boxes that thin the cloud out first: one point in each."""
+_AROUND, _AHEAD = 0.8, 1.3
+"""m around the way and the goal, and ahead of both, from which points are kept."""
 _LATE = 0.3
 """s after the end of a swing within which a foot may come down."""
 _SETTLES = 2
@@ -94,7 +96,7 @@ class CrossingSeries:
         swings: every swing of every leg, in order.
         maps: in order.
         routes: in order.
-        points: (m, 3) m, the cloud, thinned, odometry frame, in order of time.
+        points: (m, 3) m, the cloud near the way, thinned, odometry frame, in order of time.
         point_time: (m,) s, from the first tick.
         seen: points before thinning.
     """
@@ -163,7 +165,8 @@ def extract_crossing(run: RunData, series: RunSeries, foot_radius: float) -> Cro
     estimate = np.array([estimated_q(record)[:7] for record in telemetry])
     turns = [_turn(true[3:7], believed[3:7]) for true, believed in zip(series.q, estimate, strict=True)]
     estimate[:, :3] -= rise
-    points, point_time, seen = _cloud(telemetry)
+    goal = _goal(telemetry)
+    points, point_time, seen = _cloud(telemetry, np.concatenate([estimate[:, :2], goal[None]]))
     return CrossingSeries(
         time=series.time,
         has_truth=series.has_truth,
@@ -177,7 +180,7 @@ def extract_crossing(run: RunData, series: RunSeries, foot_radius: float) -> Cro
         lift=_reported(reports, "lift", 4),
         drift=_reported(reports, "drift")[:, 0],
         sweeps=max(report.sweeps for report in reports if report is not None),
-        goal=_goal(telemetry),
+        goal=goal,
         position=series.q[:, :3] if series.has_truth else estimate[:, :3],
         estimate=estimate[:, :3],
         turn=np.array(turns),
@@ -226,7 +229,7 @@ def is_map(ground: HeightMap | None) -> TypeGuard[HeightMap]:
 def is_route(report: CrossingReport) -> bool:
     """True of a report with a new way that can be drawn."""
     route = report.route
-    return route.ndim == 2 and len(route) > 0 and bool(np.isfinite(route[:, :2]).all())
+    return route.ndim == 2 and len(route) > 1 and bool(np.isfinite(route[:, :2]).all())
 
 
 def _goal(telemetry: Sequence[Telemetry]) -> FloatArray:
@@ -244,21 +247,25 @@ def _reported(reports: Sequence[CrossingReport | None], name: str, width: int = 
     return np.array([nothing if r is None else np.reshape(getattr(r, name), width) for r in reports])
 
 
-def _cloud(telemetry: Sequence[Telemetry]) -> tuple[FloatArray, FloatArray, int]:
-    """Points (m, 3) with their times (m,), evenly thinned, and how many there were."""
+def _cloud(telemetry: Sequence[Telemetry], way: FloatArray) -> tuple[FloatArray, FloatArray, int]:
+    """Points (m, 3) near a way (n, 2), with their times (m,), evenly thinned, and how many there were."""
     found = [(r.time, r.crossing.points) for r in telemetry if r.crossing is not None]
     pieces = [(time, points[np.isfinite(points).all(axis=1)]) for time, points in found if len(points)]
     if not pieces:
         return np.zeros((0, 3)), np.zeros(0), 0
     points = np.concatenate([points for _, points in pieces])
     time = np.repeat([time for time, _ in pieces], [len(points) for _, points in pieces])
+    seen = len(points)
+    low, high = np.nanmin(way, axis=0) - _AROUND, np.nanmax(way, axis=0) + np.array([_AHEAD, _AROUND])
+    near = ((points[:, :2] >= low) & (points[:, :2] <= high)).all(axis=1)
+    points, time = points[near], time[near]
     boxes = np.round(points / _FINEST).astype(np.int64) + (1 << 19)
     _, first = np.unique((boxes[:, 0] << 40) + (boxes[:, 1] << 20) + boxes[:, 2], return_index=True)
     kept = np.sort(first)
     # Every third of three rays that lie side by side would leave out whole sides of things: at random.
     if len(kept) > MOST_POINTS:
         kept = np.sort(np.random.default_rng(0).choice(kept, MOST_POINTS, replace=False))
-    return points[kept], time[kept], len(points)
+    return points[kept], time[kept], seen
 
 
 def _swings(

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from bluefoot_mpc.types import BoolArray, FloatArray
+from bluefoot_mpc.types import FloatArray
 from bluefoot_mpc.viz.crossing_series import CrossingSeries
 from bluefoot_mpc.viz.packing import pack, stride_for
 from bluefoot_mpc.viz.plots import Panel, Trace
@@ -15,8 +15,6 @@ from bluefoot_mpc.viz.style import COMMAND, ROUTE
 
 _WAY = 800
 """Most points of a way."""
-_AROUND = 0.8
-"""m around the way and the goal that are shown."""
 _STRETCH = 2.0
 """How much taller than it is a thing looks: steps of a few millimetres would not be seen."""
 _LEAST_SCALE = 20.0
@@ -25,13 +23,12 @@ _LEAST_SCALE = 20.0
 
 def cloud_picture(crossing: CrossingSeries) -> Panel:
     """All points of the run in the odometry frame, coloured by height."""
-    shown = _near(crossing)
-    points = crossing.points[shown]
+    points = crossing.points
     traces: list[Trace] = []
     if len(points):
         span = max(_LEAST_SCALE, 1e3 * float(np.percentile(np.abs(points[:, 2]), 99)))
         marker = {
-            "size": 1.8, "color": pack(1e3 * points[:, 2]), "colorscale": HEIGHTS, "cmin": -span,
+            "size": 2.0, "color": pack(1e3 * points[:, 2]), "colorscale": HEIGHTS, "cmin": -span,
             "cmax": span,
             "colorbar": {"title": {"text": "height (mm)", "side": "right"}, "thickness": 12, "len": 0.75,
                          "outlinewidth": 0},
@@ -52,33 +49,26 @@ def cloud_picture(crossing: CrossingSeries) -> Panel:
         traces.append({**_trace(star, "markers", "goal"), "marker": {"size": 6, "color": COMMAND}})
     return Panel(
         key="cloud", title="Cloud", data=traces, time=False, height=440,
-        layout={"scene": _scene(crossing, points)},
-        caption=_caption(crossing, len(points)),
+        layout={"scene": _scene(crossing)},
+        caption=_caption(crossing),
     )  # fmt: skip
 
 
-def _near(crossing: CrossingSeries) -> BoolArray:
-    """(m,) True for points near the way and the goal; those far aside would make the rest small."""
-    way = np.concatenate([crossing.estimate[:, :2], crossing.goal[None]])
-    low, high = np.nanmin(way, axis=0) - _AROUND, np.nanmax(way, axis=0) + _AROUND
-    places = crossing.points[:, :2]
-    return np.asarray(((places >= low) & (places <= high)).all(axis=1))
-
-
-def _caption(crossing: CrossingSeries, shown: int) -> str:
+def _caption(crossing: CrossingSeries) -> str:
+    shown = len(crossing.points)
     if not shown:
         return "The LIDAR gave no point of the ground near the way: only the way is shown."
     part = f"{shown} of {crossing.seen} points" if shown < crossing.seen else f"{shown} points"
     return f"{part} where the robot placed them. Heights are stretched {_STRETCH:g} times. Drag to turn."
 
 
-def _scene(crossing: CrossingSeries, points: FloatArray) -> dict[str, Any]:
+def _scene(crossing: CrossingSeries) -> dict[str, Any]:
     axis = {"gridcolor": "@line", "zerolinecolor": "@line", "linecolor": "@line", "color": "@muted",
             "showbackground": False}  # fmt: skip
-    drawn = np.concatenate([points, crossing.estimate, [[*crossing.goal, np.nan]]])
+    drawn = np.concatenate([crossing.points, crossing.estimate, [[*crossing.goal, np.nan]]])
     size = np.maximum(np.nanmax(drawn, axis=0) - np.nanmin(drawn, axis=0), 0.1) * [1.0, 1.0, _STRETCH]
     # Plotly's box has sides of about one; its longest side is the longest of the drawn things.
-    ratio = 1.9 * size / size.max()
+    ratio = 2.1 * size / size.max()
     return {
         "xaxis": {**axis, "title": {"text": "x (m)"}},
         "yaxis": {**axis, "title": {"text": "y (m)"}},

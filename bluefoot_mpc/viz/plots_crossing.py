@@ -25,40 +25,35 @@ from bluefoot_mpc.viz.style import (
 
 _MEAN = 1.2
 """s over which achieved speed is averaged: a cycle of the walk."""
-_ROWS = (("", (0.965, 1.0)), ("pitch (°)", (0.72, 0.93)), ("speed (mm/s)", (0.47, 0.67)),
-         ("step height (mm)", (0.235, 0.42)), ("to the goal (m)", (0.0, 0.185)))  # fmt: skip
+_BAND, _GAP = 0.035, 0.055
+"""Shares of a figure's height: the band of phases, and what lies between two rows."""
 
 
 def phases_over_time(series: RunSeries, crossing: CrossingSeries, period: float) -> Panel:
-    """What the robot was at, its pitch, speed and step heights, and how far the goal was."""
-    traces = [*_bands(crossing, period), *_pitch(crossing), *_speed(series, crossing, period)]
-    for leg, name in enumerate(LEGS):
-        if np.isfinite(crossing.lift[:, leg]).any():
-            trace = curve(crossing.time, 1e3 * crossing.lift[:, leg], name, LEG_COLOURS[name], axis="y4")
-            # Legs wear their colours on the whole page.
-            traces.append({**trace, "showlegend": False})
-    traces += _distance(crossing)
-    layout: dict[str, Any] = {
-        "yaxis" if k == 0 else f"yaxis{k + 1}": {
-            "domain": list(domain),
-            "title": {"text": title, "font": {"size": 11}},
-        }
-        for k, (title, domain) in enumerate(_ROWS)
-    }
-    layout["yaxis"] |= {"range": [-0.5, 0.5], "fixedrange": True, "showgrid": False, "showticklabels": False,
-                        "ticks": "", "zeroline": False}  # fmt: skip
-    lifts = crossing.lift[np.isfinite(crossing.lift)]
-    layout["yaxis4"]["range"] = [0.0, 1.15 * max(20.0, 1e3 * float(lifts.max(initial=0.0)))]
-    layout["yaxis5"]["rangemode"] = "tozero"
-    layout["xaxis"] = {"title": {"text": "time (s)"}, "anchor": "y5"}
+    """What the robot was at, its pitch, its speed and step heights, and how far the goal was."""
+    found = [("pitch (°)", _pitch(crossing)), ("speed (mm/s)", _speed(series, crossing, period)),
+             ("step height (mm)", _lift(crossing)), ("to the goal (m)", _distance(crossing))]  # fmt: skip
+    drawn = [(title, traces) for title, traces in found if traces]
+    traces = _bands(crossing, period)
+    layout = _rows([title for title, _ in drawn])
+    for row, (title, own) in enumerate(drawn):
+        axis = layout[f"yaxis{row + 2}"]
+        if title.startswith("step"):
+            axis["range"] = [0.0, 1.15e3 * max(0.02, float(np.nanmax(crossing.lift)))]
+        elif not title.startswith("pitch"):
+            axis["rangemode"] = "tozero"
+        traces += [{**trace, "yaxis": f"y{row + 2}"} for trace in own]
     return Panel(
-        key="crossing", title="Crossing", data=traces, layout=layout, height=640, wide=True,
+        key="crossing", title="Crossing", data=traces, layout=layout, wide=True,
+        height=120 + 130 * len(drawn),
         caption=_caption(crossing),
     )  # fmt: skip
 
 
-def side_view(profiles: Sequence[Profile]) -> Panel:
-    """Ground and feet from the side, along the way of each foot."""
+def side_view(crossing: CrossingSeries, profiles: Sequence[Profile]) -> Panel | None:
+    """Ground and feet from the side, along the way of each foot; None where no foot ever stepped."""
+    if not crossing.swings:
+        return None
     traces: list[Trace] = []
     layout = _side_rows(len(profiles))
     names = []
@@ -78,6 +73,23 @@ def side_view(profiles: Sequence[Profile]) -> Panel:
         caption=f"Lowest point of each foot along its own way, and {ground} under it, by the map in force at "
         "the time. Heights are stretched. Least height over the ground: in the middle half of the swings.",
     )  # fmt: skip
+
+
+def _rows(titles: Sequence[str]) -> dict[str, Any]:
+    """A narrow band above plots over one time axis."""
+    layout: dict[str, Any] = {
+        "yaxis": {"domain": [1.0 - _BAND, 1.0], "range": [-0.5, 0.5], "fixedrange": True, "showgrid": False,
+                  "showticklabels": False, "ticks": "", "zeroline": False, "title": {"text": ""}}
+    }  # fmt: skip
+    share = (1.0 - _BAND) / len(titles)
+    for row, title in enumerate(titles):
+        top = 1.0 - _BAND - row * share
+        layout[f"yaxis{row + 2}"] = {
+            "domain": [max(0.0, top - share), top - _GAP],
+            "title": {"text": title, "font": {"size": 11}},
+        }
+    layout["xaxis"] = {"title": {"text": "time (s)"}, "anchor": f"y{len(titles) + 1}"}
+    return layout
 
 
 def _bands(crossing: CrossingSeries, period: float) -> list[Trace]:
@@ -106,20 +118,31 @@ def _pitch(crossing: CrossingSeries) -> list[Trace]:
     if crossing.has_truth:
         lines.append(("truth", crossing.pitch_truth, "@ink", "dot"))
     return [
-        curve(crossing.time, np.degrees(values), name, colour, axis="y2", dash=dash, width=1.5)
+        curve(crossing.time, np.degrees(values), name, colour, dash=dash, width=1.5)
         for name, values, colour, dash in lines
         if np.isfinite(values).any()
     ]
 
 
 def _speed(series: RunSeries, crossing: CrossingSeries, period: float) -> list[Trace]:
+    if not np.nanmax(crossing.speed, initial=0.0) > 0.0:
+        return []
     speed = series.velocity_truth if series.has_truth else series.velocity_estimate
     count = max(1, round(_MEAN / period))
-    allowed = curve(crossing.time, 1e3 * crossing.speed, "allowed", COMMAND, axis="y3", width=1.6)
+    allowed = curve(crossing.time, 1e3 * crossing.speed, "allowed", COMMAND, width=1.6)
     name = f"achieved (mean of {_MEAN:g} s)"
     return [
-        curve(crossing.time, 1e3 * smoothed(speed[:, 0], count), name, "@ink", axis="y3", width=1.3),
+        curve(crossing.time, 1e3 * smoothed(speed[:, 0], count), name, "@ink", width=1.3),
         {**allowed, "line": {**allowed["line"], "shape": "hv"}},
+    ]
+
+
+def _lift(crossing: CrossingSeries) -> list[Trace]:
+    """Legs wear their colours on the whole page, and need no legend."""
+    return [
+        {**curve(crossing.time, 1e3 * crossing.lift[:, leg], name, LEG_COLOURS[name]), "showlegend": False}
+        for leg, name in enumerate(LEGS)
+        if np.isfinite(crossing.lift[:, leg]).any() and crossing.swings
     ]
 
 
@@ -132,7 +155,7 @@ def _distance(crossing: CrossingSeries) -> list[Trace]:
     traces = []
     for name, way, colour, dash in ways:
         left = np.hypot(*(way[:, :2] - crossing.goal).T)
-        trace = curve(crossing.time, left, name, colour, axis="y5", dash=dash, width=1.5)
+        trace = curve(crossing.time, left, name, colour, dash=dash, width=1.5)
         traces.append({**trace, "showlegend": False})
     return traces
 
@@ -146,10 +169,12 @@ def _caption(crossing: CrossingSeries) -> str:
     known = crossing.drift[np.isfinite(crossing.drift)]
     moved = f", which corrected older maps by up to {1e3 * known.max():.0f} mm" if known.any() else ""
     said.append(f"{crossing.sweeps} sweep{'' if crossing.sweeps == 1 else 's'}{moved}.")
-    return (
-        f"{' '.join(said)} Pitch: nose down is positive. Speed allowed by the difficulty of the ground. "
-        "Step heights of the next swings in the legs' colours."
-    )
+    said.append("Pitch: nose down is positive.")
+    if crossing.swings:
+        said.append(
+            "Speed: as the difficulty of the ground allows; heights of the next steps in the legs' colours."
+        )
+    return " ".join(said)
 
 
 def _side_rows(count: int) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.settings import dump_toml
 from bluefoot_mpc.viz import plots, plots_ground, plots_level, plots_machine, plots_plan
 from bluefoot_mpc.viz.animation import player_script, viewer_script
-from bluefoot_mpc.viz.crossing import crossing_of
+from bluefoot_mpc.viz.crossing import Crossing, crossing_of
 from bluefoot_mpc.viz.journey import journey_of
 from bluefoot_mpc.viz.level_series import extract_leveling
 from bluefoot_mpc.viz.packing import stretches
@@ -21,7 +21,8 @@ from bluefoot_mpc.viz.plots import Panel
 from bluefoot_mpc.viz.series import RunSeries, extract
 from bluefoot_mpc.viz.stage_motion import replay_data
 from bluefoot_mpc.viz.style import BAD, NEUTRAL
-from bluefoot_mpc.viz.verdict import facts, number, tiles, verdict
+from bluefoot_mpc.viz.verdict import Tile, facts, number, tiles, verdict
+from bluefoot_mpc.viz.verdict_crossing import CROSSING, crossing_events, crossing_tiles
 from bluefoot_mpc.viz.verdict_way import NAVIGATION, way_events, way_tiles
 
 SERVO_TEMPERATURE_LIMIT = 70.0
@@ -79,7 +80,7 @@ def report_html(
         verdict=judged,
         facts=facts(summary),
         checks=checks,
-        tiles=[*way_tiles(summary, checks), *tiles(summary, stall_torque, run.period, checks)],
+        tiles=[*_own_tiles(summary, checks, crossing), *tiles(summary, stall_torque, run.period, checks)],
         has_ticks=has_ticks,
         has_truth=series.has_truth,
         has_sweeps=bool(data.get("sweeps")),
@@ -96,8 +97,22 @@ def report_html(
         versions=sorted((summary.get("versions") or {}).items()),
         all_figures=_flat(summary),
         footer=_footer(series, len(run.telemetry)),
-        **_events(series, way_events(run, journey.guided) if journey is not None else []),
+        **_events(
+            series,
+            [
+                *(way_events(run, journey.guided) if journey is not None else []),
+                *(crossing_events(crossing.series) if crossing is not None else []),
+            ],
+        ),
     )
+
+
+def _own_tiles(
+    summary: Mapping[str, Any], checks: Sequence[Mapping[str, Any]], crossing: Crossing | None
+) -> list[Tile]:
+    """Key figures of what the robot did on its own."""
+    found = crossing_tiles(summary, checks) if crossing is not None else []
+    return [*found, *way_tiles(summary, checks)]
 
 
 def _panels(run: RunData, series: RunSeries, stall_torque: float, named: Mapping[str, Any]) -> list[Panel]:
@@ -156,7 +171,11 @@ def _marks(series: RunSeries) -> list[dict[str, Any]]:
 def _events(series: RunSeries, on_the_way: Sequence[tuple[float, str]]) -> dict[str, Any]:
     """Events with equal ones in a row put together, and a caption that tells what was left out."""
     grouped: list[dict[str, Any]] = []
-    told = [event for event in _with_pushes(series) if not (on_the_way and event[1].startswith(NAVIGATION))]
+    told = [
+        event
+        for event in _with_pushes(series)
+        if not (on_the_way and event[1].startswith((NAVIGATION, CROSSING)))
+    ]
     for time, text in sorted([*told, *on_the_way], key=lambda event: event[0]):
         last = next((group for group in reversed(grouped[-4:]) if group["text"] == text), None)
         if last is not None and time - last["end"] < 0.5:

@@ -25,6 +25,8 @@ _DID = {
     "goto": "went to its waypoints",
     "approach": "approached the marker",
     "follow": "followed the leader",
+    "sweep": "swept the ground ahead",
+    "rough": "crossed the rough ground",
 }
 
 
@@ -276,7 +278,10 @@ def _tile(
 
 
 def _extent(summary: Mapping[str, Any]) -> str:
-    path = (summary.get("figures") or {}).get("path_m")
+    figures = summary.get("figures") or {}
+    path, reached = figures.get("path_m"), figures.get("reached_s")
+    if reached is not None:
+        return f" in {number(reached, 0)} s"
     if path is not None:
         return f" over {number(path, 1)} m in {number(summary.get('duration_s'), 0)} s"
     distance, speed = summary.get("distance_m"), summary.get("speed_mps")

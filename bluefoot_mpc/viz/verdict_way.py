@@ -38,10 +38,25 @@ def way_tiles(summary: Mapping[str, Any], checks: Sequence[Mapping[str, Any]] = 
         summary: the summary, as in ``summary.json``.
         checks: the scenario's criteria; one with a ``figure`` judges that tile by its ``goal``.
     """
+    return figure_tiles(_FIGURES, summary, checks)
+
+
+def figure_tiles(
+    table: Sequence[tuple[str, str, int, str, str]],
+    summary: Mapping[str, Any],
+    checks: Sequence[Mapping[str, Any]],
+) -> list[Tile]:
+    """Key figures by a table; those that a run does not have are left out.
+
+    Args:
+        table: key, label, digits, unit and what is measured, of each figure.
+        summary: the summary, as in ``summary.json``.
+        checks: the scenario's criteria; one with a ``figure`` judges that tile by its ``goal``.
+    """
     figures = summary.get("figures") or {}
     judged = {check["figure"]: check for check in checks if check.get("figure")}
     found = []
-    for key, label, digits, unit, note in _FIGURES:
+    for key, label, digits, unit, note in table:
         value = figures.get(key)
         if isinstance(value, list):
             value = max((entry for entry in value if entry is not None), default=None)
