@@ -23,10 +23,10 @@ _SINGLE = 1e-9
 class FitConfig:
     """How the surroundings of a point are fitted. Defaults by measurement: docs/terrain-surface.md."""
 
-    neighbours: int = 40  # at most so many, the nearest ones
-    radius: float = 0.10  # m, none beyond
-    width: float = 0.05  # m, standard deviation of the Gaussian weight over distance
-    step: float = 0.004  # m, standard deviation of the weight over the distance from the plane: keeps edges
+    neighbours: int = 48  # at most so many, the nearest ones
+    radius: float = 0.12  # m, none beyond
+    width: float = 0.08  # m, standard deviation of the Gaussian weight over distance
+    step: float = 0.0035  # m, standard deviation of the weight over the distance from the plane: keeps edges
     rounds: int = 3  # fits of the smoothing
 
     def __post_init__(self) -> None:

@@ -17,10 +17,12 @@ class Normals:
     Attributes:
         normal: (n, 3) unit vectors, z not negative.
         curvature: (n,) 0..1/3, share of the variance along the normal: 0 on a plane.
+        support: (n,) 0..1, share of the surroundings' weight that lies near the plane.
     """
 
     normal: FloatArray
     curvature: FloatArray
+    support: FloatArray
 
 
 def normals(points: FloatArray, around: Neighbours, guess: FloatArray, config: FitConfig) -> Normals:
@@ -33,13 +35,16 @@ def normals(points: FloatArray, around: Neighbours, guess: FloatArray, config: F
         config: of the fit.
     """
     if not len(points):
-        return Normals(normal=np.zeros((0, 3)), curvature=np.zeros(0))
+        return Normals(normal=np.zeros((0, 3)), curvature=np.zeros(0), support=np.zeros(0))
     offset = offsets(points, around)
-    planes = fit_planes(offset, same_face(offset, around.weight, guess, config.step))
+    near = same_face(offset, around.weight, guess, config.step)
+    planes = fit_planes(offset, near)
+    weight = around.weight.sum(axis=1)
     total = planes.spread.sum(axis=1)
     return Normals(
         normal=planes.normal,
         curvature=planes.spread[:, 0] / np.where(total > 0.0, total, 1.0),
+        support=near.sum(axis=1) / np.where(weight > 0.0, weight, 1.0),
     )
 
 

@@ -20,12 +20,13 @@ class SurfaceConfig:
     voxel: float = 0.02  # m, side of a voxel
     fit: FitConfig = field(default_factory=FitConfig)
     least_neighbours: int = 6  # a point with fewer around it is not surface
+    least_support: float = 0.4  # share of its surroundings near its plane; a point with less is not surface
     flatness: float = 0.06  # e_max: 1 - cos of the angle to the vertical that is flat; 0.06 is 20 degrees
 
     def __post_init__(self) -> None:
         require_positive(voxel=self.voxel)
         require_range(3, self.fit.neighbours, least_neighbours=self.least_neighbours)
-        require_range(0.0, 1.0, flatness=self.flatness)
+        require_range(0.0, 1.0, least_support=self.least_support, flatness=self.flatness)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -51,7 +52,8 @@ def reconstruct(points: FloatArray, config: SurfaceConfig | None = None) -> Surf
     """Voxel grid, moving least squares, normals, flat candidates (thesis, chapter 6, terrain).
 
     Points that are no finite numbers are left out, and so are those with too few
-    others around them; an empty or scattered cloud gives an empty surface.
+    others around them, or too few near the plane through them: stray echoes, and
+    most of the sides of blocks. An empty or scattered cloud gives an empty surface.
 
     Args:
         points: (k, 3) m, the cloud, z up.
@@ -66,12 +68,13 @@ def reconstruct(points: FloatArray, config: SurfaceConfig | None = None) -> Surf
     smoothed, guess = smooth(voxels.points, around, config.fit)
     found = normals(smoothed, around, guess, config.fit)
     rough = roughness(voxels.points, smoothed, around, found.normal)
+    kept = dense & (found.support >= config.least_support)
     return Surface(
-        points=smoothed[dense],
-        normals=found.normal[dense],
-        flat=flat(found.normal[dense], config.flatness),
-        roughness=rough[dense],
-        curvature=found.curvature[dense],
+        points=smoothed[kept],
+        normals=found.normal[kept],
+        flat=flat(found.normal[kept], config.flatness),
+        roughness=rough[kept],
+        curvature=found.curvature[kept],
     )
 
 

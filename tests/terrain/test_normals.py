@@ -44,10 +44,18 @@ def test_curvature_tells_even_from_rough_ground():
     assert ((rough >= 0.0) & (rough <= 1.0 / 3.0 + 1e-12)).all()
 
 
+def test_support_is_high_on_a_face_and_low_beside_it():
+    rng = np.random.default_rng(2)
+    points = np.vstack((ground(rng, 2000)[0], [[0.7, 0.0, 0.03]]))
+    support = found(points, guess=np.tile((0.0, 0.0, 1.0), (2001, 1))).support
+    assert support[:-1].min() > 0.9
+    assert support[-1] < 0.2
+
+
 def test_no_points_have_no_normals():
     nothing = found(np.zeros((0, 3)))
     assert nothing.normal.shape == (0, 3)
-    assert nothing.curvature.shape == (0,)
+    assert nothing.curvature.shape == nothing.support.shape == (0,)
 
 
 def test_flat_is_within_the_angle():
