@@ -91,7 +91,8 @@ def cost_tensor(ground: HeightMap, config: CostConfig) -> FloatArray:
         ground: the map.
         config: weights and feet.
     """
-    return tensor(ground.height, squared_slope(ground.height, ground.cell), ground.cell, config)
+    height = np.where(np.isfinite(ground.height), ground.height, np.nan)
+    return tensor(height, squared_slope(height, ground.cell), ground.cell, config)
 
 
 def tensor(height: FloatArray, slope: FloatArray, cell: float, config: CostConfig) -> FloatArray:

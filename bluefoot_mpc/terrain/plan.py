@@ -68,7 +68,12 @@ def plan_route(
         standing = np.array([start], dtype=np.float64)
         return Route(poses=standing, cost=0.0, planner=config.planner, feasible=True, reason="at the goal",
                      reaches_goal=True)  # fmt: skip
-    grid = planning_grid(ground, start, goal, config, quality)
+    if ground.height.size == 0:
+        return _none(config, "the map is empty: sweep first")
+    return _planned_route(planning_grid(ground, start, goal, config, quality), start, config)
+
+
+def _planned_route(grid: PlanningGrid, start: tuple[float, float, float], config: PlanConfig) -> Route:
     blind = grid.unknown_feet(grid.start)
     if blind:
         return _none(config, f"the ground under {', '.join(blind)} at the start is unknown: sweep again")

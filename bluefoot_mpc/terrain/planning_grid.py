@@ -27,7 +27,7 @@ class PlanningGrid:
         cost: (n, m, l) cost tensor; finite at the start.
         start: cell of the start, which stands at its centre.
         start_turn: broken yaw index of the start.
-        goal_j: column of the goal, or the last one where the goal is beyond the horizon.
+        goal_j: column of the goal, off the grid where it is beyond the horizon.
         spacing: m between neighbouring feet.
     """
 
@@ -123,7 +123,7 @@ def _frame(
     frame = HeightMap(
         time=ground.time, cell=cell, pose=pose, height=height, confidence=np.zeros(height.shape)
     )
-    return frame, (i, j), behind + ahead
+    return frame, (i, j), behind + steps
 
 
 def _sampled(
@@ -133,7 +133,8 @@ def _sampled(
     at = centres(frame)
     i, j = cells_of(ground, at)
     inside = i >= 0
-    peaks = highest_within(ground.height, ground.cell, config.under_radius)
+    known_height = np.where(np.isfinite(ground.height), ground.height, np.nan)
+    peaks = highest_within(known_height, ground.cell, config.under_radius)
     height = np.where(inside, near.height[i, j], np.nan)
     slope = np.where(inside, near.slope[i, j], np.nan)
     known = inside & near.known[i, j]

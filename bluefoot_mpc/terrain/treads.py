@@ -72,6 +72,7 @@ def treads(height: FloatArray, cell: float, config: TreadConfig, quality: FloatA
         config: limits.
         quality: (n, m) 0..1, how well a foot stands on a cell, where that was rated; None where it was not.
     """
+    height = np.where(np.isfinite(height), height, np.nan)
     slope = np.minimum(squared_slope(height, cell), _STEEP)
     with np.errstate(invalid="ignore"):
         good = _gentlest(height, cell) <= math.tan(math.radians(config.max_slope_deg)) ** 2
