@@ -8,6 +8,7 @@ from bluefoot_mpc.navigation.crossing.follower import FollowerConfig
 from bluefoot_mpc.navigation.crossing.pace import PaceConfig
 from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
 from bluefoot_mpc.terrain.cloud import CloudConfig
+from bluefoot_mpc.terrain.free_space import FreeSpaceConfig
 from bluefoot_mpc.terrain.ground import RatingConfig
 from bluefoot_mpc.terrain.height_map import MapConfig
 from bluefoot_mpc.terrain.merge import MergeConfig
@@ -20,10 +21,11 @@ from bluefoot_mpc.terrain.sweep import SweepConfig
 class CrossingConfig:
     """Configuration of each part, and of what ties them together."""
 
-    sweep: SweepConfig = field(default_factory=SweepConfig)
+    sweep: SweepConfig = field(default_factory=lambda: SweepConfig(dwell_scans=2))
     cloud: CloudConfig = field(default_factory=CloudConfig)
     map: MapConfig = field(default_factory=MapConfig)
     merge: MergeConfig = field(default_factory=MergeConfig)
+    free_space: FreeSpaceConfig = field(default_factory=FreeSpaceConfig)
     align: Bounds = field(default_factory=Bounds)
     rating: RatingConfig = field(default_factory=RatingConfig)
     plan: PlanConfig = field(default_factory=lambda: PlanConfig(even_radius=0.0))
@@ -34,7 +36,7 @@ class CrossingConfig:
     ahead: float = 1.6  # m, of the map, ahead of the robot
     behind: float = 0.7  # m
     aside: float = 0.8  # m to either side
-    stretch: float = 0.45  # m that are walked from one sweep to the next
+    stretch: float = 0.50  # m that are walked from one sweep to the next
     settle_time: float = 0.3  # s for which all feet rest before a sweep
     think_ticks: int = 20  # command periods for mapping and planning
     patience: float = 3.0  # s that a foot may have nowhere to step before the robot looks again

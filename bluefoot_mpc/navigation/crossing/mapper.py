@@ -14,6 +14,7 @@ from bluefoot_mpc.navigation.crossing.pace import paces
 from bluefoot_mpc.navigation.crossing.pose_track import PoseTrack
 from bluefoot_mpc.terrain.cloud import lidar_place, scan_points
 from bluefoot_mpc.terrain.frame import centres
+from bluefoot_mpc.terrain.free_space import carved
 from bluefoot_mpc.terrain.ground import Ground, rate_ground
 from bluefoot_mpc.terrain.height_map import MapBuilder, Region
 from bluefoot_mpc.terrain.merge import Walked, merge
@@ -54,7 +55,7 @@ class Mapper:
 
     def reset(self) -> None:
         """Forget the ground."""
-        self._builder = MapBuilder(self._config.map)
+        self._collected = Collected(self._config)
         self._track = PoseTrack()
         self._known: HeightMap | None = None
         self._place: FloatArray | None = None
@@ -80,7 +81,7 @@ class Mapper:
 
     def begin_sweep(self) -> None:
         """Forget the points of the last sweep; its map stays."""
-        self._builder = MapBuilder(self._config.map)
+        self._collected = Collected(self._config)
 
     def add(self, points: FloatArray, estimate: BodyState) -> None:
         """Take the points of a scan in.
@@ -91,7 +92,7 @@ class Mapper:
         """
         if len(points):
             origin = lidar_place(estimate.position, estimate.quaternion, self._mounts)
-            self._builder.add(points, estimate.time, origin)
+            self._collected.add(points, origin, estimate.time)
 
     def look(self, frame: SensorFrame, estimate: BodyState) -> FloatArray:
         """(k, 3) m, odometry frame, what a scan of this tick met while walking; it is taken in."""
@@ -113,10 +114,10 @@ class Mapper:
             pose: (3,) m, m, rad: where the robot is, and its heading.
             goal: (2,) m, odometry frame.
         """
-        builder, known, place, config = self._builder, self._known, self._place, self._config
-        self._builder, self._place = MapBuilder(config.map), pose[:2]
+        seen, known, place, config = self._collected, self._known, self._place, self._config
+        self._collected, self._place = Collected(config), pose[:2]
         way = 0.0 if place is None else float(np.hypot(*(pose[:2] - place)))
-        return lambda: think(builder, known, Walked(way=way, place=pose[:2]), Aim(pose, goal), config)
+        return lambda: think(seen, known, Walked(way=way, place=pose[:2]), Aim(pose, goal), config)
 
     def take(self, thought: Thought) -> None:
         """Go on from a new map."""
@@ -129,6 +130,37 @@ class Mapper:
             return TrunkPose()
         swing = config.walking_swing_deg * math.sin(2.0 * math.pi * time / config.walking_period)
         return TrunkPose(rpy=np.array([0.0, math.radians(config.walking_pitch_deg + swing), 0.0]))
+
+
+class Collected:
+    """Points of scans, and the rays that led to them.
+
+    Args:
+        config: of the crossing.
+    """
+
+    def __init__(self, config: CrossingConfig) -> None:
+        self.builder = MapBuilder(config.map)
+        self._points: list[FloatArray] = []
+        self._origins: list[FloatArray] = []
+
+    def add(self, points: FloatArray, origin: FloatArray, time: float) -> None:
+        """Take the points of a scan in.
+
+        Args:
+            points: (k, 3) m, odometry frame.
+            origin: (3,) m, the LIDAR.
+            time: s.
+        """
+        self.builder.add(points, time, origin)
+        self._points.append(points)
+        self._origins.append(np.broadcast_to(origin, points.shape))
+
+    def rays(self) -> tuple[FloatArray, FloatArray]:
+        """(k, 3) m, all ends, and (k, 3) m, where each ray came from."""
+        if not self._points:
+            return np.zeros((0, 3)), np.zeros((0, 3))
+        return np.vstack(self._points), np.vstack(self._origins)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,23 +177,24 @@ class Aim:
 
 
 def think(
-    builder: MapBuilder, known: HeightMap | None, walked: Walked, aim: Aim, config: CrossingConfig
+    seen: Collected, known: HeightMap | None, walked: Walked, aim: Aim, config: CrossingConfig
 ) -> Thought:
     """Map, put together with what was known, rate it for feet, and plan a way.
 
     Args:
-        builder: with the newest points.
+        seen: the newest points.
         known: the map so far; None without one.
         walked: since then.
         aim: from where to where.
         config: how.
     """
-    fresh = builder.build(region_around(aim.pose, config))
+    fresh = seen.builder.build(region_around(aim.pose, config))
     drift = 0.0
     if known is not None:
         shift = align(known, fresh, config.align)
         known, drift = moved(known, shift), math.hypot(shift.x, shift.y)
-    ground = rate_ground(merge(known, fresh, walked, config.merge), config.rating)
+    merged = carved(merge(known, fresh, walked, config.merge), *seen.rays(), config.free_space)
+    ground = rate_ground(merged, config.rating)
     x, y, yaw = aim.pose.tolist()
     goal_x, goal_y = aim.goal.tolist()
     route = shortened(plan_route(ground.map, (x, y, yaw), (goal_x, goal_y), config.plan), config.stretch)
