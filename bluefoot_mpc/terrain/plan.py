@@ -77,7 +77,7 @@ def _planned_route(grid: PlanningGrid, start: tuple[float, float, float], config
     blind = grid.unknown_feet(grid.start)
     if blind:
         return _none(config, f"the ground under {', '.join(blind)} at the start is unknown: sweep again")
-    ahead = reachable(grid.cost[:, : grid.goal_j + 1], grid.start)
+    ahead = reachable(grid.cost[:, : grid.last_j + 1], grid.start)
     columns = np.flatnonzero(ahead.any(axis=(0, 2)))
     last = int(columns[-1]) if columns.size else grid.start[1]
     if last < grid.goal_j and (last - grid.start[1]) * grid.map.cell < config.least_advance:

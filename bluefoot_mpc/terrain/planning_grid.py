@@ -28,6 +28,7 @@ class PlanningGrid:
         start: cell of the start, which stands at its centre.
         start_turn: broken yaw index of the start.
         goal_j: column of the goal, off the grid where it is beyond the horizon.
+        last_j: last column to plan for: the goal's, or that at the horizon.
         spacing: m between neighbouring feet.
     """
 
@@ -37,6 +38,7 @@ class PlanningGrid:
     start: Start
     start_turn: float
     goal_j: int
+    last_j: int
     spacing: float
 
     def unknown_feet(self, cell: Start) -> list[str]:
@@ -49,6 +51,8 @@ class PlanningGrid:
 
     def what_ends(self, cell: Start) -> str:
         """What is in the way one column ahead of a cell."""
+        if cell[1] >= self.last_j:
+            return "further is not planned at once"
         blind = self.unknown_feet((cell[0], cell[1] + 1, cell[2]))
         if blind:
             return f"the ground under {', '.join(blind)} ahead of that is unknown"
@@ -80,7 +84,7 @@ def planning_grid(
     """
     away, far = math.atan2(goal[1] - start[1], goal[0] - start[0]), math.dist(start[:2], goal)
     steps = max(math.ceil(far / config.cell - 1e-9), 1)
-    frame, cell, goal_j = _frame(ground, (start[0], start[1], away), far / steps, steps, config)
+    frame, cell, last_j = _frame(ground, (start[0], start[1], away), far / steps, steps, config)
     near = treads(ground.height, ground.cell, config.treads, quality)
     found, under = _sampled(ground, near, frame, config)
     turn = wrap_angle(start[2] - away)
@@ -98,7 +102,7 @@ def planning_grid(
     turned = (turn + math.pi) * config.cost.yaws / (2.0 * math.pi)
     return PlanningGrid(
         replace(frame, height=found.height), found.known, cost, first,
-        turned if abs(turned - u) < 1.0 else float(u), goal_j, config.cost.spacing,
+        turned if abs(turned - u) < 1.0 else float(u), cell[1] + steps, last_j, config.cost.spacing,
     )  # fmt: skip
 
 
@@ -110,7 +114,7 @@ def _reach_of(turn: float, yaws: int) -> float:
 def _frame(
     ground: HeightMap, start: tuple[float, float, float], cell: float, steps: int, config: PlanConfig
 ) -> tuple[HeightMap, tuple[int, int], int]:
-    """An empty map along start's yaw, the start's cell (i, j) in it and the goal's column."""
+    """An empty map along start's yaw, the start's cell (i, j) in it and the last column to plan for."""
     x, y, yaw = start
     behind = math.ceil(config.cost.spacing / cell)
     side = math.ceil((config.side + config.cost.spacing) / cell)
@@ -123,7 +127,7 @@ def _frame(
     frame = HeightMap(
         time=ground.time, cell=cell, pose=pose, height=height, confidence=np.zeros(height.shape)
     )
-    return frame, (i, j), behind + steps
+    return frame, (i, j), behind + ahead
 
 
 def _sampled(
