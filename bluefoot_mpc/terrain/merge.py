@@ -33,10 +33,12 @@ class MergeConfig:
     confident: float = 0.3  # confidence from which a newer height wins against an older one
     least: float = 0.1  # confidence below which a height is unknown
     agree: float = 2.0  # standard deviations within which two heights are averaged
+    agree_most: float = 0.010  # m, beyond which they never are: they are of two sides of an edge
 
     def __post_init__(self) -> None:
         require_nonnegative(
-            drift=self.drift, turn_deg=self.turn_deg, steepness=self.steepness, agree=self.agree
+            drift=self.drift, turn_deg=self.turn_deg, steepness=self.steepness, agree=self.agree,
+            agree_most=self.agree_most,
         )  # fmt: skip
         require_positive(trusted=self.trusted)
         require_range(0.0, 1.0, confident=self.confident, least=self.least)
@@ -83,7 +85,8 @@ def merge(
     ours, theirs = _variance(new.confidence, config), _variance(confidence, config)
     both = np.isfinite(height) & np.isfinite(new.height)
     with np.errstate(invalid="ignore"):
-        near = both & (np.abs(height - new.height) <= config.agree * np.sqrt(ours + theirs))
+        limit = np.minimum(config.agree * np.sqrt(ours + theirs), config.agree_most)
+        near = both & (np.abs(height - new.height) <= limit)
     newer = np.isfinite(new.height) & (
         ~np.isfinite(height) | (new.confidence >= np.minimum(config.confident, confidence))
     )
