@@ -28,11 +28,11 @@ from .synthetic_run import make_run
 
 SEED = 4
 WORLD = "rubble"
-BEGIN, WALKS, ENDS = 0.2, 1.0, 10.0
+BEGIN, WALKS, ENDS = 0.2, 1.0, 6.0
 """s: beginning of the first sweep, of the walk and of the second sweep."""
 DRIFT = 0.002
 """m/s that the estimate runs away to the left."""
-GOAL = np.array([0.6, 0.0])
+GOAL = np.array([0.4, 0.0])
 CELL = 0.02
 LIFT = 0.03
 RADIUS = 0.008
@@ -50,7 +50,7 @@ def rubble(world: str = WORLD) -> WorldPlan:
 def crossing_run(
     robot: RobotModel,
     *,
-    duration: float = 12.0,
+    duration: float = 8.0,
     truth: bool = True,
     world: str = WORLD,
     blocked: bool = False,
