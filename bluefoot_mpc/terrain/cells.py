@@ -57,12 +57,15 @@ class CellConfig:
 
 
 def cell_heights(
-    index: NDArray[np.intp], height: FloatArray, noise: FloatArray, cells: int, config: CellConfig
-) -> tuple[FloatArray, FloatArray]:
+    index: NDArray[np.intp], height: FloatArray, noise: FloatArray, cells: int, config: CellConfig,
+    away: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Height and confidence of every cell; NaN and 0 where there are too few points.
 
     Confidence is ``k / (k + 1) / (1 + (s / trusted)²)``: k points, s the height's standard deviation with the
     spread beyond the known noise (an edge within the cell, a slope, scans that do not fit) added in full.
+    With the points' places in their cells it is less where they all lie to one side: they may be of the next
+    cell's edge, spilled over by the noise along the ray, and the rest of the cell may be anything, or a hole.
 
     Args:
         index: (k,) cell of each point.
@@ -70,6 +73,7 @@ def cell_heights(
         noise: (k,) m, standard deviation of each height.
         cells: in all.
         config: how.
+        away: (k, 2) each point's place in its cell, -1 to 1 from side to side; None: not known.
 
     Returns:
         (cells,) m and (cells,) 0..1.
@@ -87,12 +91,15 @@ def cell_heights(
         upper = mean
     elif config.estimate == "upper":
         upper -= sigma * _excess(count, config.trim)
-        away = (height - upper[index]) / np.maximum(sigma[index], 1e-9)
-        near = (away >= -_BELOW) & (away <= _ABOVE)
+        above = (height - upper[index]) / np.maximum(sigma[index], 1e-9)
+        near = (above >= -_BELOW) & (above <= _ABOVE)
         used = np.maximum(np.bincount(index[near], minlength=cells), 1)
         upper = np.bincount(index[near], height[near], minlength=cells) / used
     uncertain = variance / used + np.maximum(spread - variance, 0.0)
     confidence = count / (count + 1.0) / (1.0 + uncertain / config.trusted**2)
+    if away is not None:
+        aside = [np.abs(np.bincount(index, part, minlength=cells)) / share for part in away.T]
+        confidence *= 1.0 - np.maximum(*aside) ** 2
     return np.where(known, upper, np.nan), np.where(known, confidence, 0.0)
 
 

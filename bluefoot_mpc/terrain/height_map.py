@@ -30,13 +30,14 @@ class MapConfig:
     spike: float = 0.010  # m off its square's median from which a height is replaced; 0 = always, as printed
     gap: int = 1  # cells, widest gap between known cells that is bridged
     gap_step: float = 0.010  # m, of height across a gap that is bridged, at most
+    gap_trust: float = 0.6  # confidence of the cells on both sides of a gap that is bridged, at least
     gap_confidence: float = 0.3  # of its neighbours' confidence, in a bridged gap
     capacity: int = 200_000  # points that are kept, the newest
 
     def __post_init__(self) -> None:
         require_positive(cell=self.cell, gap_step=self.gap_step, capacity=self.capacity)
         require_nonnegative(dilation=self.dilation, gap=self.gap, spike=self.spike)
-        require_range(0.0, 1.0, gap_confidence=self.gap_confidence)
+        require_range(0.0, 1.0, gap_confidence=self.gap_confidence, gap_trust=self.gap_trust)
         require_range(1, 15, median=self.median)
         if self.median % 2 == 0:
             raise ConfigurationError(f"median = {self.median} must be odd: a cell has a square around it")
@@ -154,14 +155,18 @@ class MapBuilder:
         """
         config, cell = self._config, self._config.cell
         table = self._table()
-        index, inside = _cell_index(table, region, cell)
+        index, away, inside = _cell_index(table, region, cell)
         table = table[inside]
         shape = (region.n, region.m)
         raw, confidence = cell_heights(
-            index[inside], table[:, 2] - region.pose[2], table[:, 3], region.n * region.m, config.cells
-        )
+            index[inside], table[:, 2] - region.pose[2], table[:, 3], region.n * region.m, config.cells,
+            away[inside],
+        )  # fmt: skip
         raw, confidence = raw.reshape(shape), confidence.reshape(shape)
-        whole, gaps = close_gaps(raw, config.gap, config.gap_step)
+        sure = np.where(confidence >= config.gap_trust, raw, np.nan)
+        bridged, gaps = close_gaps(sure, config.gap, config.gap_step)
+        gaps &= np.isnan(raw)
+        whole = np.where(gaps, bridged, raw)
         near = np.fmax.reduce(neighbours(confidence, config.gap), axis=0)
         confidence = np.where(gaps, config.gap_confidence * near, confidence)
         height = median(dilate(whole, config.dilation), config.median, config.spike)
@@ -254,13 +259,15 @@ def _window_sums(values: FloatArray, n: int, m: int) -> FloatArray:
     return np.asarray(total[n:, m:] - total[:-n, m:] - total[n:, :-m] + total[:-n, :-m])
 
 
-def _cell_index(points: FloatArray, region: Region, cell: float) -> tuple[NDArray[np.intp], BoolArray]:
-    """(k,) flat index of the cell that holds each point, and (k,) whether the region does."""
+def _cell_index(
+    points: FloatArray, region: Region, cell: float
+) -> tuple[NDArray[np.intp], FloatArray, BoolArray]:
+    """Where points are: (k,) flat index of the cell, (k, 2) -1..1 in it, (k,) whether the region holds it."""
     x, y, _, yaw = region.pose.tolist()
     c, s = math.cos(yaw), math.sin(yaw)
     away_x, away_y = points[:, 0] - x, points[:, 1] - y
-    j = np.floor((c * away_x + s * away_y) / cell)
-    i = np.floor((c * away_y - s * away_x) / cell)
+    along, aside = (c * away_x + s * away_y) / cell, (c * away_y - s * away_x) / cell
+    i, j = np.floor(aside), np.floor(along)
     inside = (i >= 0.0) & (i < region.n) & (j >= 0.0) & (j < region.m)
     index = np.where(inside, i * region.m + j, 0.0).astype(np.intp)
-    return index, inside
+    return index, 2.0 * np.column_stack((along - j, aside - i)) - 1.0, inside

@@ -31,7 +31,7 @@ class MergeConfig:
     steepness: float = 0.2  # rise per metre that even ground is taken to have, at least
     trusted: float = 0.010  # m, standard deviation of a height with a confidence of one half
     confident: float = 0.3  # confidence from which a newer height wins against an older one
-    least: float = 0.1  # confidence below which a height is unknown
+    least: float = 0.2  # confidence below which a height is unknown
     agree: float = 2.0  # standard deviations within which two heights are averaged
     agree_most: float = 0.010  # m, beyond which they never are: they are of two sides of an edge
 

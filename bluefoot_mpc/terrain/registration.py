@@ -38,7 +38,7 @@ class Bounds:
     misfit: float = 0.008  # m, of heights; beyond some times this a cell is left out
     sure: float = 0.004  # m, standard deviation of a shift that is believed
     sure_deg: float = 0.5  # degrees, of a turn that is believed
-    step: float = 0.010  # m, of the coarse grid
+    step: float = 0.015  # m, of the coarse grid
     step_deg: float = 1.5  # degrees
     iterations: int = 8  # of the refinement
 

@@ -184,3 +184,25 @@ def test_configuration_is_checked(wrong: dict[str, float], cause: str) -> None:
     """A message names the value."""
     with pytest.raises(ConfigurationError, match=cause):
         MapConfig(**wrong)  # type: ignore[arg-type]
+
+
+def test_points_on_one_side_of_a_cell_are_trusted_less() -> None:
+    """They may have spilled over from the edge of the next one."""
+    rng = np.random.default_rng(0)
+    index, noise, height = np.zeros(20, dtype=np.intp), np.full(20, 0.003), rng.normal(0.0, 0.003, 20)
+    even = rng.uniform(-1.0, 1.0, (20, 2))
+    aside = np.column_stack((even[:, 0], 0.5 + 0.5 * even[:, 1] ** 2))
+    full, less = (cell_heights(index, height, noise, 1, CellConfig(), away)[1][0] for away in (even, aside))
+    assert less < 0.7 * full
+
+
+def test_gaps_are_bridged_between_trusted_cells_only() -> None:
+    """A cell without a point in the midst of even ground is no hole; between doubtful cells it stays one."""
+    points = np.random.default_rng(0).uniform((0.4, -0.4, 0.0), (1.2, 0.4, 0.0), (20_000, 3))
+    hole = (points[:, 0] > 0.8) & (points[:, 0] < 0.82) & (points[:, 1] > 0.0) & (points[:, 1] < 0.02)
+    for trust, known in ((0.5, True), (1.0, False)):
+        builder = MapBuilder(MapConfig(gap_trust=trust))
+        builder.add(points[~hole], 1.0)
+        ground = builder.build(AHEAD)
+        assert np.isfinite(heights_at(ground, np.array([0.81, 0.01]))) == known
+        assert ground.confidence[35, 40] == (pytest.approx(0.3, abs=0.03) if known else 0.0)
