@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bluefoot_mpc.terrain.frame import centres, heights_at
-from bluefoot_mpc.types import FloatArray
+from bluefoot_mpc.types import BoolArray, FloatArray
 from bluefoot_mpc.viz.crossing_series import CrossingSeries, MapAt
 
 Heights = Callable[[FloatArray], FloatArray]
@@ -106,7 +106,7 @@ def profiles(crossing: CrossingSeries, heights: Heights | None) -> list[Profile]
 
 def _profile(crossing: CrossingSeries, leg: int, heights: Heights | None) -> Profile:
     foot = crossing.feet[:, leg]
-    ticks, places = _along(foot[:, :2])
+    ticks, places = _along(foot[:, :2], _lifted(crossing, leg))
     mapped = _mapped(crossing, leg, ticks)
     true = np.full(len(places), np.nan) if heights is None else heights(places)
     return Profile(
@@ -115,11 +115,24 @@ def _profile(crossing: CrossingSeries, leg: int, heights: Heights | None) -> Pro
     )  # fmt: skip
 
 
-def _along(way: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Ticks (k,), fractions among them, and places (k, 2) m, evenly spaced along the way of a foot."""
+def _lifted(crossing: CrossingSeries, leg: int) -> BoolArray:
+    """(n,) True from before a swing until its landing."""
+    lifted = np.zeros(len(crossing.time), dtype=np.bool_)
+    for swing in crossing.swings:
+        if swing.leg == leg:
+            lifted[max(0, swing.start - 1) : swing.landed + 1] = True
+    return lifted
+
+
+def _along(way: FloatArray, lifted: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Ticks (k,), fractions among them, and places (k, 2) m, evenly spaced along the way of a foot.
+
+    Args:
+        way: (n, 2) m, of the foot.
+        lifted: (n,) True where it is on its way: what it slips while it stands is none.
+    """
     steps = np.hypot(*np.diff(way, axis=0).T)
-    # What a standing foot slips, or an estimate trembles, is no way.
-    steps = np.where(np.isfinite(steps) & (steps > 2e-4), steps, 0.0)
+    steps = np.where(np.isfinite(steps) & lifted[1:], steps, 0.0)
     gone = np.concatenate([[0.0], np.cumsum(steps)])
     first = np.concatenate([[True], np.diff(gone) > 0.0])
     wanted = np.arange(0.0, gone[-1] + _SAMPLE, _SAMPLE)

@@ -24,6 +24,12 @@ def pack(values: ArrayLike) -> dict[str, Any]:
     return packed
 
 
+def pack_mask(values: NDArray[np.bool_]) -> dict[str, Any]:
+    """A table of zeros and ones as plotly.js reads it, a quarter as large as numbers are."""
+    data = base64.b64encode(np.ascontiguousarray(values, dtype="<i1").tobytes()).decode("ascii")
+    return {"dtype": "i1", "bdata": data, "shape": ", ".join(map(str, values.shape))}
+
+
 def pack_bytes(values: NDArray[np.uint8]) -> str:
     """Base64 of small integers."""
     return base64.b64encode(np.ascontiguousarray(values, dtype=np.uint8).tobytes()).decode("ascii")

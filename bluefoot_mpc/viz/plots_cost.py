@@ -73,7 +73,7 @@ def cost_slices(crossing: CrossingSeries, config: CostConfig) -> Panel | None:
     share = (1.0 - _GAP * (len(names) - 1)) / len(names)
     height = share * _WIDTH * (high[1] - low[1]) / (high[0] - low[0]) + _ROOM
     return Panel(
-        key="cost", title="Cost of standing", data=steps[-1].data, wide=True, time=False, steps=steps,
+        key="cost", title="Cost of standing", data=[], wide=True, time=False, steps=steps,
         height=round(float(np.clip(height, 240, 620))), layout=_layout(low, high, names, share),
         caption="Cost of standing with the trunk over each cell, for three headings, on a logarithmic scale, "
         "computed again from the cells of the map; grey: a foot would be on unknown ground. Pink: the "
@@ -119,8 +119,8 @@ def _traces(
             {**raster.unknown(stands, legend=False), **axes},
             raster.heatmap(
                 power, colorscale="Viridis", zmin=scale[0], zmax=scale[1], showscale=k == 0, **axes,
-                colorbar=_bar(scale), customdata=pack(raster.show(cost)),
-                hovertemplate="x %{x:.2f} m, y %{y:.2f} m<br>cost %{customdata:.3g}<extra></extra>",
+                colorbar=_bar(scale),
+                hovertemplate="x %{x:.2f} m, y %{y:.2f} m<br>cost 10<sup>%{z:.1f}</sup><extra></extra>",
             ),
         ]  # fmt: skip
         for poses in routes[-1:]:

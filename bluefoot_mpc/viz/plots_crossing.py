@@ -22,6 +22,7 @@ from bluefoot_mpc.viz.style import (
     PHASE_COLOURS,
     PHASE_NAMES,
 )
+from bluefoot_mpc.viz.verdict import number
 
 _MEAN = 1.2
 """s over which achieved speed is averaged: a cycle of the walk."""
@@ -62,7 +63,7 @@ def side_view(crossing: CrossingSeries, profiles: Sequence[Profile]) -> Panel | 
         low, high = _heights(profiles)
         layout["yaxis" if row == 0 else f"yaxis{row + 1}"]["range"] = [low, high]
         traces += _profile_traces(profile, axis, low, first=row == 0)
-        least = f", least {1e3 * profile.least:.0f} mm over it" if np.isfinite(profile.least) else ""
+        least = f", least {number(profile.least, 0, 1e3)} mm over it" if np.isfinite(profile.least) else ""
         names.append(f"{LEG_NAMES[LEGS[profile.leg]]}{least}")
     name_rows(layout, names, [LEG_COLOURS[LEGS[profile.leg]] for profile in profiles])
     truth = any(np.isfinite(profile.true).any() for profile in profiles)
@@ -113,7 +114,7 @@ def _bands(crossing: CrossingSeries, period: float) -> list[Trace]:
 
 
 def _pitch(crossing: CrossingSeries) -> list[Trace]:
-    lines = [("wanted", crossing.pitch, COMMAND, "solid"),
+    lines = [("wanted pitch", crossing.pitch, COMMAND, "solid"),
              ("estimate", crossing.pitch_estimate, ESTIMATE, "solid")]  # fmt: skip
     if crossing.has_truth:
         lines.append(("truth", crossing.pitch_truth, "@ink", "dot"))
@@ -129,7 +130,7 @@ def _speed(series: RunSeries, crossing: CrossingSeries, period: float) -> list[T
         return []
     speed = series.velocity_truth if series.has_truth else series.velocity_estimate
     count = max(1, round(_MEAN / period))
-    allowed = curve(crossing.time, 1e3 * crossing.speed, "allowed", COMMAND, width=1.6)
+    allowed = curve(crossing.time, 1e3 * crossing.speed, "allowed speed", COMMAND, width=1.6)
     name = f"achieved (mean of {_MEAN:g} s)"
     return [
         curve(crossing.time, 1e3 * smoothed(speed[:, 0], count), name, "@ink", width=1.3),

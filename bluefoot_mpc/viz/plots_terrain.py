@@ -12,7 +12,7 @@ from bluefoot_mpc.viz.crossing_series import CrossingSeries, MapAt
 from bluefoot_mpc.viz.crossing_truth import REACH, MapError
 from bluefoot_mpc.viz.packing import pack, stride_for
 from bluefoot_mpc.viz.plots import Panel, Step, Trace
-from bluefoot_mpc.viz.rasters import Raster, bounds, raster_of
+from bluefoot_mpc.viz.rasters import Raster, bounds, raster_of, together
 from bluefoot_mpc.viz.style import COMMAND, LEG_COLOURS, ROUTE
 
 MOST_MAPS = 8
@@ -40,11 +40,12 @@ def height_map(crossing: CrossingSeries) -> Panel:
             label=f"{crossing.time[entry.tick]:.1f} s",
             note="the last map" if entry is shown[-1] else "",
             time=float(crossing.time[entry.tick]),
-            data=[*_heights(entry.ground, span), *_routes(crossing, entry.tick), *over],
+            data=[*_heights(_until(shown, entry), span), *_routes(crossing, entry.tick), *over],
         )
         for entry in shown
     )
-    data = steps[-1].data if steps else [*_routes(crossing, len(crossing.time)), *over]
+    # The page draws one of the steps; what they show need not be there twice.
+    data = [] if steps else [*_routes(crossing, len(crossing.time)), *over]
     height = _WIDTH * (high[1] - low[1]) / (high[0] - low[0]) + _ROOM
     return Panel(
         key="ground", title="Ground as mapped", data=data, wide=True, time=False, follows=True,
@@ -70,7 +71,7 @@ def map_quality(crossing: CrossingSeries, errors: Sequence[MapError]) -> Panel |
     )
     return Panel(
         key="map-quality", title="Error of the map" if errors else "Confidence of the map",
-        data=steps[-1].data, time=False, height=400, steps=steps, layout=_layout(*_around(shown)),
+        data=[], time=False, height=400, steps=steps, layout=_layout(*_around(shown)),
         caption=_quality_caption(errors),
     )  # fmt: skip
 
@@ -80,6 +81,11 @@ def some_maps(maps: Sequence[MapAt], most: int = MOST_MAPS) -> list[MapAt]:
     if len(maps) <= most:
         return list(maps)
     return [maps[k] for k in np.unique(np.linspace(0, len(maps) - 1, most).round().astype(int))]
+
+
+def _until(shown: Sequence[MapAt], entry: MapAt) -> HeightMap:
+    """What was known of the ground when a map was new: the older ones show where it ends."""
+    return together([other.ground for other in shown if other.tick <= entry.tick])
 
 
 def _heights(ground: HeightMap, span: float) -> list[Trace]:
@@ -204,8 +210,8 @@ def _caption(crossing: CrossingSeries) -> str:
         )
     dashed = "; dashed: where the robot believed to be" if crossing.has_truth else ""
     return (
-        f"Odometry frame, heights over the ground at the start; grey cells are unknown. Lines: planned and "
-        f"walked way{dashed}.{steps} One button for each map."
+        "Odometry frame, heights over the ground at the start; grey cells are unknown, older maps show where "
+        f"the newest ends. Lines: planned and walked way{dashed}.{steps} One button for each map."
     )
 
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bluefoot_mpc.terrain.frame import cells_of, centres, to_world
+from bluefoot_mpc.terrain.frame import cells_of, centres, heights_at, to_world
 from bluefoot_mpc.types import BoolArray, FloatArray, HeightMap
-from bluefoot_mpc.viz.packing import pack
+from bluefoot_mpc.viz.packing import pack, pack_mask
 from bluefoot_mpc.viz.plots import Trace
 
 UNKNOWN = "rgba(138,148,166,0.42)"
@@ -50,11 +51,12 @@ class Raster:
 
     def unknown(self, known: BoolArray, *, legend: bool = True) -> Trace:
         """A heat map that fills the cells that are not `known` (n, m)."""
-        scale = [[0.0, UNKNOWN], [1.0, UNKNOWN]]
-        return self.heatmap(
-            np.where(known, np.nan, 0.0), colorscale=scale, showscale=False, hoverinfo="skip",
-            name="unknown", showlegend=legend, zmin=0.0, zmax=1.0,
-        )  # fmt: skip
+        hidden = (self.i >= 0) & ~known[self.i, self.j]
+        return {
+            "type": "heatmap", "x": pack(self.x), "y": pack(self.y), "z": pack_mask(hidden),
+            "colorscale": [[0.0, "rgba(0,0,0,0)"], [1.0, UNKNOWN]], "showscale": False, "hoverinfo": "skip",
+            "name": "unknown", "showlegend": legend, "zmin": 0.0, "zmax": 1.0,
+        }  # fmt: skip
 
 
 def raster_of(ground: HeightMap) -> Raster:
@@ -74,6 +76,32 @@ def raster_of(ground: HeightMap) -> Raster:
     y = np.arange(low[1] + 0.5 * step, high[1], step)
     i, j = cells_of(ground, np.stack(np.meshgrid(x, y), axis=-1))
     return Raster(x, y, i, j)
+
+
+def together(maps: Sequence[HeightMap]) -> HeightMap:
+    """One map of several, along the odometry frame's axes: where they overlap, the last one holds.
+
+    Args:
+        maps: one or more, in their order.
+    """
+    newest = maps[-1]
+    if len(maps) == 1:
+        return newest
+    corners = np.array([bounds(ground) for ground in maps])
+    # Maps of one grid keep their cells.
+    low = newest.pose[:2] + newest.cell * np.floor(
+        (corners[:, 0].min(axis=0) - newest.pose[:2]) / newest.cell + 1e-6
+    )
+    columns, rows = np.ceil((corners[:, 1].max(axis=0) - low) / newest.cell - 1e-6).astype(int).tolist()
+    y, x = np.mgrid[:rows, :columns]
+    places = low + newest.cell * (np.stack([x, y], axis=-1) + 0.5)
+    height = np.full((rows, columns), np.nan)
+    for ground in maps:
+        found = heights_at(ground, places)
+        height = np.where(np.isfinite(found), found, height)
+    pose = np.array([*low.tolist(), 0.0, 0.0])
+    known = np.isfinite(height).astype(np.float64)
+    return HeightMap(time=newest.time, cell=newest.cell, pose=pose, height=height, confidence=known)
 
 
 def bounds(ground: HeightMap) -> tuple[FloatArray, FloatArray]:
