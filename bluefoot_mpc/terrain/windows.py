@@ -49,15 +49,13 @@ class _Window:
         aside: (a,) in i.
         ahead: (w,) in j.
         turned: (b,) in u.
-        way: the (a, w, b) cells that a way to (i, last, u) passes, as indices into a tensor with a border.
-        far: (a, w, b) True where a cell is further aside than ahead, so that no way leads to it.
+        way: the (a, w, b) cells that moves towards (i, last, u) pass, as indices into a tensor in a border.
     """
 
     aside: NDArray[np.intp]
     ahead: NDArray[np.intp]
     turned: NDArray[np.intp]
     way: tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]
-    far: NDArray[np.bool_]
 
 
 def search(
@@ -108,9 +106,8 @@ def _window(window: int, yaw_window: int) -> _Window:
     aside, turned = np.arange(-window, window + 1), np.arange(-yaw_window, yaw_window + 1)
     ahead = np.arange(1, window + 1)
     at_i, at_j, at_u = aside[:, None, None], ahead[None, :, None], turned[None, None, :]
-    far = (np.abs(at_i) > at_j) | (np.abs(at_u) > at_j)
     way = (np.clip(at_i, -at_j, at_j), at_j, np.clip(at_u, -at_j, at_j))
-    return _Window(aside, ahead, turned, (way[0] + window, way[1], way[2] + yaw_window), far)
+    return _Window(aside, ahead, turned, (way[0] + window, way[1], way[2] + yaw_window))
 
 
 def _step(wide: FloatArray, cell: Start, goal: Goal, window: _Window, aim: Aim) -> tuple[int, int] | None:
@@ -148,11 +145,10 @@ def _prices(wide: FloatArray, cell: Start, window: _Window) -> FloatArray:
 
 
 def _means(wide: FloatArray, cell: Start, window: _Window) -> FloatArray:
-    """(a, w, b) mean costs of the ways to a window's cells; infinite where there is no such way."""
+    """(a, w, b) mean costs of the moves towards a window's cells; infinite where one of them is."""
     i, j, u = cell
     view = np.cumsum(wide[window.way[0] + i, window.way[1] + j, window.way[2] + u], axis=1)
     view /= window.ahead[None, :, None]
-    view[window.far] = np.inf
     return view
 
 

@@ -79,7 +79,8 @@ def test_the_route_ends_where_known_ground_ends():
 def test_nothing_is_known_but_the_start():
     made = ground(lambda x, y: np.full_like(x, np.nan))
     route = plan_route(made, START, GOAL, CONFIG)
-    assert route.poses[:, 0].max(initial=0.0) < 0.45 - 0.1
+    assert route.feasible
+    assert 0.15 < route.poses[-1, 0] < 0.45 - 0.1
     blind = plan_route(made, START, GOAL, PlanConfig(even_radius=0.0))
     assert not blind.feasible
     assert blind.poses.shape == (0, 3)
@@ -101,6 +102,14 @@ def test_a_block_too_high_is_gone_round():
     check_route(route, made)
     assert route.reaches_goal
     assert route.poses[:, 1].min() < -0.02
+
+
+def test_a_post_between_the_feet_is_not_passed_over():
+    made = ground(lambda x, y: np.where((np.abs(x - 0.8) < 0.03) & (np.abs(y) < 0.03), 0.09, 0.0))
+    route = plan_route(made, START, GOAL, CONFIG)
+    assert route.reaches_goal
+    near = np.abs(route.poses[:, 0] - 0.8) < 0.08
+    assert np.abs(route.poses[near, 1]).min() > 0.08
 
 
 def test_a_wall_ends_the_route():

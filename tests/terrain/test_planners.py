@@ -154,6 +154,13 @@ def test_the_thesis_rule_steps_towards_the_cheapest_cell():
     assert (search(cost, (10, 0, 2), window=2, aim=Aim.CELL).cells[:, 0] == 10).all()
 
 
+def test_what_lies_behind_the_goal_does_not_count():
+    cost = np.ones((21, 12, 5))
+    cost[7, 5:] = 0.0
+    for aim in Aim:
+        assert (search(cost, (10, 0, 2), Goal(4), 8, aim=aim).cells[:, 0] == 10).all()
+
+
 def test_the_other_rule_asks_what_lies_between():
     cost = np.ones((21, 12, 5))
     cost[7, 5] = 0.0
