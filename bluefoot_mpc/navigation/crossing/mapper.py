@@ -72,12 +72,10 @@ class Mapper:
             feet: (4, 3) m, foot points in the odometry frame.
             time: s.
         """
-        if self._stands:
-            return
+        if not self._stands and self._config.start_radius > 0.0:
+            under = feet - (0.0, 0.0, self._foot_radius)
+            self._known = merge(self._known, even_ground(under, time, self._config))
         self._stands = True
-        if self._config.start_radius > 0.0:
-            ground = feet - (0.0, 0.0, self._foot_radius)
-            self._known = merge(self._known, even_ground(ground, time, self._config))
 
     def begin_sweep(self) -> None:
         """Forget the points of the last sweep; its map stays."""
@@ -224,13 +222,7 @@ def even_ground(under: FloatArray, time: float, config: CrossingConfig) -> Heigh
     middle = under.mean(axis=0)
     radius = config.start_radius
     low, high = middle[:2] - radius, middle[:2] + radius
-    region = Region.spanning(
-        (float(low[0]), float(high[0])), (float(low[1]), float(high[1])), config.map.cell
-    )
-    empty = np.full((region.n, region.m), np.nan)
-    ground = HeightMap(
-        time=time, cell=config.map.cell, pose=region.pose, height=empty, confidence=np.zeros_like(empty)
-    )
+    ground = _unknown((float(low[0]), float(high[0])), (float(low[1]), float(high[1])), time, config)
     slope, *_ = np.linalg.lstsq(under[:, :2] - middle[:2], under[:, 2] - middle[2], rcond=None)
     away = centres(ground) - middle[:2]
     near = np.hypot(away[..., 0], away[..., 1]) <= radius
@@ -238,6 +230,17 @@ def even_ground(under: FloatArray, time: float, config: CrossingConfig) -> Heigh
     return replace(
         ground, height=np.where(near, height, np.nan),
         confidence=np.where(near, config.start_confidence, 0.0),
+    )  # fmt: skip
+
+
+def _unknown(
+    x: tuple[float, float], y: tuple[float, float], time: float, config: CrossingConfig
+) -> HeightMap:
+    """A map of ranges of x and y (m, odometry frame) in which nothing is known."""
+    region = Region.spanning(x, y, config.map.cell)
+    return HeightMap(
+        time=time, cell=config.map.cell, pose=region.pose, height=np.full((region.n, region.m), np.nan),
+        confidence=np.zeros((region.n, region.m)),
     )  # fmt: skip
 
 
