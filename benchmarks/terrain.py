@@ -1,7 +1,7 @@
 """Time of seeing and planning over rough ground, and errors of map and normals against the truth.
 
     OMP_NUM_THREADS=1 python benchmarks/terrain.py [--rounds 50] [--json]
-    OMP_NUM_THREADS=1 python benchmarks/terrain.py --errors [--seeds 5] [--worlds rubble ramp] [--set fit.step=0.006]
+    OMP_NUM_THREADS=1 python benchmarks/terrain.py --errors [--seeds 5] [--worlds kerb] [--set voxel=0.03]
 
 Times: a cloud of 20,000 points to normals (voxel grid and moving least squares
 included), the same cloud to a height map of 20 mm, its patches, the cost tensor
@@ -28,11 +28,13 @@ import numpy as np
 from terrain_sweeps import Swept, ahead, angles, faces_below, true_faces
 
 from bluefoot_mpc.model.robot import load_robot
+from bluefoot_mpc.navigation.crossing.config import CrossingConfig
 from bluefoot_mpc.settings import build, merge, parse_override
 from bluefoot_mpc.sim.config import TERRAIN_WORLDS
 from bluefoot_mpc.sim.worlds.heights import heights
 from bluefoot_mpc.terrain.cost import CostConfig, cost_tensor
 from bluefoot_mpc.terrain.frame import centres
+from bluefoot_mpc.terrain.free_space import carved
 from bluefoot_mpc.terrain.graph import optimal
 from bluefoot_mpc.terrain.height_map import MapBuilder, Region
 from bluefoot_mpc.terrain.patches import segment
@@ -45,7 +47,10 @@ BARS = {"normals": 100.0, "cost tensor": 50.0, "search": 1000.0}
 """ms of one core that the median may take."""
 LIMITS = {"map_median_mm": 5.0, "map_p95_mm": 15.0, "normal_median_deg": 4.0}
 CELLS, CELL, YAWS = 100, 0.02, 36
+REACH = 1.2
+"""m from the trunk, within which errors count."""
 REGION = Region.spanning((0.30, 1.20), (-0.60, 0.60), CELL)
+CROSSING = CrossingConfig()
 EDGE = 0.02
 """m from an edge, within which a normal is not told apart by its face."""
 
@@ -117,23 +122,24 @@ def print_times(wall, processor, points, rounds):
         print(f"{name:14s}{np.median(values):9.1f}{np.percentile(values, 99):9.1f}{p50:9.1f}{p99:9.1f}{word}")
 
 
-def errors_of(robot, name, seed, height, config):
-    """Errors of the map (m) and of normals (degrees) of one sweep."""
-    swept = Swept(robot, name, seed, height)
-    builder, parts = MapBuilder(), []
-    for k, (points, origin) in enumerate(swept.scans()):
+def errors_of(swept, config):
+    """Errors of the map (m) and of normals (degrees) of one sweep, as the robot sweeps and maps."""
+    builder, parts, origins = MapBuilder(CROSSING.map), [], []
+    for k, (points, origin) in enumerate(swept.scans(scans=CROSSING.sweep.dwell_scans)):
         builder.add(points, 0.1 * k, origin)
         parts.append(points)
-    ground = builder.build(REGION)
+        origins.append(np.broadcast_to(origin, points.shape))
+    cloud = np.concatenate(parts)
+    ground = carved(builder.build(REGION), cloud, np.concatenate(origins), CROSSING.free_space)
     places = centres(ground)
-    known = np.isfinite(ground.height) & (np.hypot(places[..., 0], places[..., 1]) <= 1.2)
-    off = np.abs(ground.height[known] + ground.pose[2] - heights(swept.plan, places[known]))
-    cloud = ahead(np.concatenate(parts))
+    within = np.hypot(places[..., 0], places[..., 1]) <= REACH
+    known = np.isfinite(ground.height) & within
+    cloud = ahead(cloud, REACH)
     surface = reconstruct(cloud, config)
     true, edge = true_faces(swept.plan, surface.points)
     return {
-        "map": off,
-        "known": known.sum() / (np.hypot(places[..., 0], places[..., 1]) <= 1.2).sum(),
+        "map": np.abs(ground.height[known] + ground.pose[2] - heights(swept.plan, places[known])),
+        "known": known.sum() / within.sum(),
         "face": angles(surface.normals, true),
         "below": angles(surface.normals, faces_below(swept.plan, surface.points)),
         "edge": edge,
@@ -143,7 +149,8 @@ def errors_of(robot, name, seed, height, config):
 
 def errors(robot, worlds, seeds, height, config):
     """Errors over seeds, world by world."""
-    print(f"{seeds} seeds a world; one sweep each, one scan a level, cells of {1e3 * CELL:.0f} mm")
+    scans = CROSSING.sweep.dwell_scans
+    print(f"{seeds} seeds a world; one sweep each, scans a level: {scans}, cells of {1e3 * CELL:.0f} mm")
     print("map: |error| of known cells, mm; normals: degrees from the nearest face, sides included (all;")
     print(f"farther than {1e3 * EDGE:.0f} mm from edges), and from the upper side at their place;")
     print("kept: share of voxels that are surface\n")
@@ -151,7 +158,7 @@ def errors(robot, worlds, seeds, height, config):
           f"{'share':>7s}{'upper':>7s}{'p90':>7s}{'kept':>7s}  limits")  # fmt: skip
     report = {}
     for name in worlds:
-        runs = [errors_of(robot, name, seed, height, config) for seed in range(seeds)]
+        runs = [errors_of(Swept(robot, name, seed, height), config) for seed in range(seeds)]
         report[name] = row = summed(runs)
         holds = all(row[key] <= limit for key, limit in LIMITS.items())
         print(

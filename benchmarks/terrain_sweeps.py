@@ -13,13 +13,14 @@ import mujoco
 import numpy as np
 
 from bluefoot_mpc.geometry import quaternion_from_rpy
+from bluefoot_mpc.navigation.crossing.config import CrossingConfig
 from bluefoot_mpc.sim.config import SimConfig, WorldConfig
 from bluefoot_mpc.sim.lidar import RaycastLidar
 from bluefoot_mpc.sim.randomization import draw
 from bluefoot_mpc.sim.world import build_world
 from bluefoot_mpc.sim.worlds.make import world_plan
 from bluefoot_mpc.terrain.cloud import lidar_place, scan_points
-from bluefoot_mpc.terrain.sweep import SweepConfig, levels
+from bluefoot_mpc.terrain.sweep import levels
 
 
 class Swept:
@@ -40,7 +41,7 @@ class Swept:
         rng = np.random.default_rng((self.seed, 7))
         whole = rng.normal(0.0, math.radians(attitude_deg), 2)
         position = np.array([0.0, 0.0, self._height])
-        wanted = levels(SweepConfig(), self._height, self._mounts.lidar[2])
+        wanted = levels(CrossingConfig().sweep, self._height, self._mounts.lidar[2])
         for pitch in np.repeat(wanted[::-1], scans):
             self._put(pitch)
             error = whole + rng.normal(0.0, math.radians(jitter_deg), 2)
