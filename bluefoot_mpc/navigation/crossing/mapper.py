@@ -195,7 +195,8 @@ def think(
     ground = rate_ground(merged, config.rating)
     x, y, yaw = aim.pose.tolist()
     goal_x, goal_y = aim.goal.tolist()
-    route = shortened(plan_route(ground.map, (x, y, yaw), (goal_x, goal_y), config.plan), config.stretch)
+    route = plan_route(ground.map, (x, y, yaw), (goal_x, goal_y), config.plan, ground.quality)
+    route = shortened(route, config.stretch)
     pace = paces(ground.map, route.poses, config.pace) if len(route.poses) else np.zeros(0)
     return Thought(ground=ground, route=route, pace=pace, drift=drift)
 
