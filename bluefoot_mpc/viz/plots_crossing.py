@@ -230,9 +230,10 @@ def _profile_traces(profile: Profile, axis: str, low: float, *, first: bool) -> 
 
 
 def _ordered(x: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Samples in the order of x: a foot that slips back would draw the ground twice."""
-    order = np.argsort(x, kind="stable")
-    return x[order], z[order]
+    """Samples of the first visit to each x: a foot that steps back would draw the ground twice."""
+    ahead = x if x[-1] >= x[0] else -x
+    first = np.concatenate([[True], ahead[1:] > np.maximum.accumulate(ahead)[:-1]])
+    return x[first], z[first]
 
 
 def _side(x: FloatArray, z: FloatArray, name: str, colour: str, axis: str, width: float) -> Trace:
