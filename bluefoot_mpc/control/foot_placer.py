@@ -139,9 +139,7 @@ class FootPlacer:
                 bias = self._bias[leg] + config.learn * miss
                 self._bias[leg] = bias * min(1.0, config.learn_most / max(abs(bias), 1e-9))
 
-    def _align(
-        self, ground: Ground, places: FloatArray, contact: BoolArray, gait: Gait, dt: float
-    ) -> None:
+    def _align(self, ground: Ground, places: FloatArray, contact: BoolArray, gait: Gait, dt: float) -> None:
         """Follow the shift between odometry and the gait's world by the standing feet."""
         feet = gait.state.feet
         standing = [leg for leg in range(4) if contact[leg] and not feet[leg].swinging]

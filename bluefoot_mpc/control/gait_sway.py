@@ -10,6 +10,7 @@ import numpy as np
 from bluefoot_mpc.control.preview_sway import PreviewSway
 from bluefoot_mpc.control.sway import Sway
 from bluefoot_mpc.gait.gait import GaitOutput
+from bluefoot_mpc.settings import require_nonnegative
 from bluefoot_mpc.types import FloatArray
 from bluefoot_mpc.zmp.preview import ComPlan
 
@@ -22,6 +23,11 @@ class SwayConfig:
 
     trot: Law = "static"
     walk: Law = "static"
+    rough_margin: float = 0.016  # m, the preview's support margin over rough ground: legs have less to spare
+    rough_depth: float = 0.004  # m inside of it, where the ZMP is wanted there
+
+    def __post_init__(self) -> None:
+        require_nonnegative(rough_margin=self.rough_margin, rough_depth=self.rough_depth)
 
 
 class GaitSway:

@@ -11,6 +11,8 @@ from bluefoot_mpc.model.legs import LegGeometry
 from bluefoot_mpc.types import BoolArray, FloatArray
 
 _CELL = 0.004
+_BENT = math.radians(15.0)
+"""rad that the knee stays bent by, and the room besides."""
 _DIRECTIONS = np.radians(np.arange(-175.0, 1.0, 2.5))
 
 
@@ -24,7 +26,9 @@ class LegReach:
     def __init__(self, geometry: LegGeometry) -> None:
         self._hips = geometry.hips
         self._bounds = geometry.bounds
-        self._tables = [_table(geometry.links, geometry.bounds[4 * leg + 1 : 4 * leg + 4]) for leg in range(4)]
+        self._tables = [
+            _table(geometry.links, geometry.bounds[4 * leg + 1 : 4 * leg + 4]) for leg in range(4)
+        ]
 
     def holds(self, leg: int, feet: FloatArray, room: float) -> BoolArray:
         """(k,) whether the leg is at (k, 3) places, m in the trunk's axes, with `room` rad to its limits."""
@@ -58,7 +62,7 @@ def _table(
     pitch = np.arctan2(rise, reach) - np.arctan2(a3 * np.sin(knee), a2 + a3 * np.cos(knee))
     pitch = (pitch + math.pi) % (2.0 * math.pi) - math.pi
     ankle = gamma - pitch - knee
-    room = np.full(r.shape, math.inf)
+    room = -knee - _BENT
     for angle, (low, high) in zip((pitch, knee, ankle), bounds, strict=True):
         room = np.minimum(room, np.minimum(angle - low, high - angle))
     room = np.where(np.abs(cosine) <= 1.0, room, -math.inf).max(axis=2)

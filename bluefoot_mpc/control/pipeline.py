@@ -169,6 +169,7 @@ class Pipeline:
         gait = self._on_the_ground(gait, estimate, upright, dt)
         footing = self._footing(estimate)
         reference, zmp, held = self._trunk.step(gait, motion, estimate, footing, dt)
+        self._targets.stand_up(self._guidance.ground is not None, dt)
         joints, cut = self._targets.step(reference, frame, dt, gait.style.ankle_shift)
         plan = self._planned(gait, reference, joints, frame)
         goals = self._goals(gait.style, joints, plan, frame)
@@ -189,7 +190,8 @@ class Pipeline:
         masses, config = LegMasses(self._robot.parameters), self.config
         preview = None
         if "preview" in (config.sway.trot, config.sway.walk):
-            preview = PreviewSway(masses, config.preview, joints_in_stance, self._gait.schedule)
+            rough = (config.sway.rough_margin, config.sway.rough_depth)
+            preview = PreviewSway(masses, config.preview, joints_in_stance, self._gait.schedule, rough)
         return GaitSway(config.sway, Sway(masses, config.zmp, joints_in_stance), preview)
 
     def _level_stage(self, gait: Gait) -> LevelStage | None:

@@ -13,7 +13,7 @@ from bluefoot_mpc.control.servo_map import ServoMapConfig
 from bluefoot_mpc.control.tracking import TrackingConfig
 from bluefoot_mpc.exceptions import UnknownNameError
 from bluefoot_mpc.gait.config import GaitConfig
-from bluefoot_mpc.gait.tuned import LEG_LENGTH, TROT, WALK
+from bluefoot_mpc.gait.tuned import LEG_LENGTH, ROUGH, TROT, WALK
 from bluefoot_mpc.leveling.config import AttitudeGains, LevelingConfig
 from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.zmp.preview.config import PreviewConfig, PreviewWeights
@@ -38,7 +38,9 @@ def preset(name: str, robot: RobotParameters | None = None) -> ControlConfig:
         return ControlConfig(
             sway=SwayConfig(trot="static", walk="preview"),
             preview=_preview(),
-            gait=GaitConfig(trot_table=TROT.scaled(size), walk_table=WALK.scaled(size)),
+            gait=GaitConfig(
+                trot_table=TROT.scaled(size), walk_table=WALK.scaled(size), rough_table=ROUGH.scaled(size)
+            ),
             posture=PostureConfig(centring=CentringConfig(enabled=True)),
             tracking=TrackingConfig(velocity_gain=0.8, velocity_bound=0.08, wait_for_ramp=True),
             ground=GroundAdaptationConfig(enabled=True),

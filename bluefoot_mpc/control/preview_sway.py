@@ -29,6 +29,7 @@ class PreviewSway:
         config: the preview.
         joints_in_stance: (16,) rad, joints for a (6,) commanded pose over the nominal stance.
         schedule: contacts ahead, by horizon (s) and time between samples (s).
+        rough: m, support margin and depth over rough ground; None for the configured ones.
     """
 
     def __init__(
@@ -37,11 +38,13 @@ class PreviewSway:
         config: PreviewConfig,
         joints_in_stance: Callable[[FloatArray], FloatArray],
         schedule: Schedule,
+        rough: tuple[float, float] | None = None,
     ) -> None:
         self._masses = masses
         self._config = config
         self._joints_in_stance = joints_in_stance
         self._schedule = schedule
+        self._rough = rough
         self._preview = PreviewController(config)
         self._ahead = np.arange(1, config.samples + 1) * config.interval
         self.reset()
@@ -79,6 +82,7 @@ class PreviewSway:
         inputs = PreviewInputs(
             schedule=schedule, nominal=nominal, velocity=velocity, heading=heading,
             height=float(trunk[2] + com[2]), pose=gait.virtual_pose,
+            margin=self._rough if gait.rough else None,
         )  # fmt: skip
         self.plan = plan = self._preview.step(inputs, dt)
         place, _, acceleration = plan.start

@@ -45,6 +45,10 @@ class QuickInverse:
         given = (self._feet, self._cells, self._places, self._shift)
         self._solve_buffer, self._solve = _bound(solve, given, (self._joints, self._cut, self._check))
 
+    def look_up(self, grid: FloatArray) -> None:
+        """Take directions from another grid from now on, laid out as `AnkleTable.grid`."""
+        self._grid = grid
+
     def joints(self, feet_in_base: FloatArray, ankle_shift: float = 0.0) -> FloatArray | None:
         """(16,) rad, inside the limits; None where something stands against them.
 

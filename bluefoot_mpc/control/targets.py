@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from bluefoot_mpc.control.quick_inverse import QuickInverse
+from bluefoot_mpc.control.upright import UprightAnkles
 from bluefoot_mpc.geometry import rotation_from_rpy
 from bluefoot_mpc.model.legs import (
     AnkleConfig,
@@ -20,6 +21,12 @@ from bluefoot_mpc.types import FloatArray, PostureReference, SensorFrame
 
 START_TIME = 1.0
 """s over which the joints go from where they were found to where they are wanted."""
+UPRIGHT = math.radians(-110.0)
+"""rad, farthest that last links lean outward among stones, where that leaves the joints `ROOM`."""
+ROOM = math.radians(5.0)
+"""rad."""
+TURN_TIME = 1.0
+"""s over which the last links turn upright and back."""
 _RECENT = 0.1
 """s for which a joint that did not answer is taken to be where it was."""
 
@@ -37,6 +44,8 @@ class JointTargets:
         self._ankle = ankle
         self._table = AnkleTable(geometry) if ankle.policy == "margin" else None
         self._quick = QuickInverse(geometry, self._table) if self._table is not None else None
+        self._upright_table = UprightAnkles(geometry, UPRIGHT, ROOM)
+        self._upright_grid = self._upright_table.grid
         self.reset()
 
     def reset(self) -> None:
@@ -44,6 +53,9 @@ class JointTargets:
         self._found: FloatArray | None = None
         self._elapsed = 0.0
         self._beyond: frozenset[int] = frozenset()
+        self._upright = 0.0
+        if self._quick is not None and self._table is not None:
+            self._quick.look_up(self._table.grid)
 
     @property
     def started(self) -> bool:
@@ -59,8 +71,31 @@ class JointTargets:
         """
         rotation = rotation_from_rpy(reference.trunk_rpy)
         feet = _feet_in_base(reference, rotation)
-        gamma = ankle_directions(self._geometry, self._ankle, feet, rotation[2], table=self._table)
+        table = self._upright_table if self._upright >= 0.5 else self._table
+        gamma = ankle_directions(self._geometry, self._ankle, feet, rotation[2], table=table)
         return inverse(self._geometry, feet, gamma + ankle_shift if ankle_shift else gamma)
+
+    def stand_up(self, upright: bool, dt: float) -> None:
+        """Turn the last links upright, as far as joints allow, or back to their widest directions.
+
+        Args:
+            upright: which of the two.
+            dt: s.
+        """
+        goal = 1.0 if upright else 0.0
+        if self._upright == goal or self._quick is None or self._table is None:
+            return
+        most = dt / TURN_TIME
+        self._upright += min(most, max(-most, goal - self._upright))
+        share = self._upright
+        grid = self._upright_grid if share == 1.0 else self._table.grid
+        if 0.0 < share < 1.0:
+            widest = self._table.grid
+            # Where the widest one bends it is not tabulated: there the turn is made at once.
+            grid = np.where(
+                np.isnan(widest), self._upright_grid, widest + share * (self._upright_grid - widest)
+            )
+        self._quick.look_up(grid)
 
     def step(
         self, reference: PostureReference, frame: SensorFrame, dt: float, ankle_shift: float = 0.0

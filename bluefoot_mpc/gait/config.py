@@ -28,7 +28,13 @@ def _walk_timing() -> GaitTiming:
 
 def _rough_timing() -> GaitTiming:
     return GaitTiming(
-        swing_share=0.2, a_v=300.0, a_omega=60.0, cycle_min=2.4, cycle_max=2.4, height_min=0.02, height_max=0.03
+        swing_share=0.2,
+        a_v=300.0,
+        a_omega=60.0,
+        cycle_min=2.4,
+        cycle_max=2.4,
+        height_min=0.02,
+        height_max=0.03,
     )
 
 

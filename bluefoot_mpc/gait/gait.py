@@ -283,6 +283,7 @@ class Gait:
             cycle_time=state.cycle,
             swing_share=share,
             style=state.style,
+            rough=state.rough,
         )
 
 

@@ -65,6 +65,7 @@ class GaitOutput:
         swing_share: share of the cycle that a leg swings.
         style: what the gait's table says about the trunk, for later stages.
         place: place between the gaits, 0 trot, 1 walk.
+        rough: True on ground whose steps are planned one by one.
     """
 
     phase: GaitPhase
@@ -78,6 +79,7 @@ class GaitOutput:
     swing_share: float
     style: Style = NO_STYLE
     place: float = 0.0
+    rough: bool = False
 
 
 @dataclass(kw_only=True, slots=True)

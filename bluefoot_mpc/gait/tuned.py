@@ -34,5 +34,8 @@ TROT = GaitTable(
 WALK = GaitTable(speed=(0.03,), step_height=(0.014,), mixing=(0.9,), back_emf=(0.5,))
 """The walk of the model-based controller; what is not here follows the gait's own laws."""
 
+ROUGH = GaitTable(speed=(0.03,), trunk_height=(0.118,), mixing=(0.6,), back_emf=(1.0,))
+"""The walk over rough ground: slower cycles (`GaitConfig.rough`), a higher trunk."""
+
 LEG_LENGTH = 0.26
 """m, of the robot that the tables were found for; see `GaitTable.scaled`."""

@@ -69,7 +69,9 @@ def choose(
     if not np.isfinite(nominal).all():
         return _none("its nominal place is no number")
     x, y = to_map(map, nominal).tolist()
-    rows, columns = (_window(centre, config.radius, cell, n) for centre, n in zip((y, x), map.height.shape, strict=True))
+    rows, columns = (
+        _window(centre, config.radius, cell, n) for centre, n in zip((y, x), map.height.shape, strict=True)
+    )
     if rows.start >= rows.stop or columns.start >= columns.stop:
         return _none("the map ends there")
     quality, height = ground.quality[rows, columns], map.height[rows, columns]

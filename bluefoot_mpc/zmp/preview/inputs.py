@@ -34,6 +34,8 @@ class PreviewInputs:
         reach: (n, 2) m, half the box around `nominal` that the legs allow, along
             and across the heading; None for the configured one.
         heading: (n,) rad, direction of that box; None for the x axis.
+        margin: m, between the edge of the support and the region, and m inside that region where the ZMP
+            is wanted; None for the configured ones.
         pose: (3,) x (m), y (m), yaw (rad) of the b' of now in any frame at rest;
             carries the previous plan over.
     """
@@ -49,4 +51,5 @@ class PreviewInputs:
     gravity: FloatArray | None = None
     reach: FloatArray | None = None
     heading: FloatArray | None = None
+    margin: tuple[float, float] | None = None
     pose: FloatArray = field(default_factory=lambda: np.zeros(3))

@@ -56,7 +56,7 @@ class PreviewProblem:
         self._feet, self._stance = np.zeros((n, 4, 2)), np.zeros((n, 4))
         self._gravity = np.zeros(2)
         self._heading, self._reach = np.zeros((n, 2)), np.zeros((n, 2))
-        choices = np.array([support.margin, support.half_width, config.depth, config.centre_pull])
+        self._choices = choices = np.array([support.margin, support.half_width, config.depth, config.centre_pull])
         at_zmp, at_com = self.normals[: 4 * n], self.normals[4 * n : 8 * n]
         of_zmp, of_com = self._offsets[:n], self._offsets[n:]
         self._rows = Bound(
@@ -94,6 +94,9 @@ class PreviewProblem:
         self._heading[:] = self._ahead
         if inputs.heading is not None:
             self._heading[:, 0], self._heading[:, 1] = np.cos(inputs.heading), np.sin(inputs.heading)
+        self._choices[0], self._choices[2] = inputs.margin or (
+            self._config.support.margin, self._config.depth
+        )  # fmt: skip
         self._rows.call()
         self.normals[8 * n :] = self.normals[4 * n - 4 : 4 * n]
         if inputs.zmp is not None:
