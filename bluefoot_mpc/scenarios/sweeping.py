@@ -20,7 +20,7 @@ MAX_MEDIAN, MAX_95 = 5.0, 15.0
 class SweepScenarioConfig(ScenarioConfig):
     """One sweep; its range and levels are of the controller: ``control.crossing.sweep``."""
 
-    duration: float = 13.0  # s
+    duration: float = 18.0  # s
     stand_time: float = 1.5  # s before the sweep, in which the attitude settles
 
     def __post_init__(self) -> None:

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from bluefoot_mpc.exceptions import ConfigurationError
-from bluefoot_mpc.settings import require_finite, require_nonnegative, require_positive, require_range
+from bluefoot_mpc.settings import require_positive, require_range
 from bluefoot_mpc.types import FloatArray
 
 MAX_LEVELS = 400
@@ -38,8 +38,8 @@ class SweepConfig:
     dwell_scans: int = 1  # scans a level
     level_timeout: float = 0.6  # s after which a level is given up
     use_all_scans: bool = True  # scans on the way between levels count too
-    forward: float = 0.0  # m, shift of the trunk over its feet while it sweeps
-    raised: float = 0.0  # m, how much higher the trunk stands while it sweeps
+    forward: float = 0.0  # m, shift of the trunk over its feet while it sweeps, where the legs reach it
+    raised: float = 0.0  # m, how much higher the trunk stands then
     approach_time: float = 2.5  # s in which the first level must be reached
     return_time: float = 2.5  # s in which the trunk must be level again
     level_deg: float = 2.0  # degrees of pitch that count as level, after the sweep
@@ -62,8 +62,7 @@ class SweepConfig:
         require_range(1, 50, dwell_scans=self.dwell_scans)
         require_range(0.002, 0.5, ground_step=self.ground_step)
         require_range(0.0, 1.0, slack=self.slack)
-        require_finite(forward=self.forward)
-        require_nonnegative(raised=self.raised)
+        require_range(-0.1, 0.1, forward=self.forward, raised=self.raised)
 
     @property
     def pitch_range(self) -> tuple[float, float]:

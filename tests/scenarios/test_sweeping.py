@@ -22,6 +22,7 @@ def swept():
         "scenario.duration=4.4", "scenario.stand_time=0.4", f"sim.lidar.mount_error_deg={list(ASKEW)}",
         "control.crossing.sweep.pitch_max_deg=22", "control.crossing.sweep.ground_step=0.05",
         "control.crossing.sweep.max_rate=1.0", "control.crossing.think_ticks=5",
+        "control.crossing.sweep.dwell_scans=1",
     )  # fmt: skip
     return simulate("sweep", RunOptions(world="flat", seed=1, controller="cpg", overrides=overrides))
 
@@ -40,7 +41,7 @@ def test_every_level_is_reached_feet_planted(swept):
     assert figures["points"] > 2000
     assert not swept.summary["fell"]
     feet = np.array([sample.foot_position[:, :2] for sample in swept.data.truth])
-    assert np.abs(feet - feet[0]).max() < 0.003
+    assert np.abs(feet - feet[0]).max() < 0.005
 
 
 def test_the_mounting_of_the_lidar_is_found_and_said(swept):

@@ -9,8 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bluefoot_mpc.model.legs import LegGeometry
 from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.navigation.crossing.pose_track import PoseTrack
+from bluefoot_mpc.navigation.crossing.sweep_stance import best_shift
 from bluefoot_mpc.terrain.cloud import CloudConfig, lidar_place, scan_points
 from bluefoot_mpc.terrain.sweep import SweepConfig, advance, levels
 from bluefoot_mpc.types import BodyState, FloatArray, LidarScan, SensorFrame, TrunkPose
@@ -21,6 +23,8 @@ OLD = 0.3
 """s; an older scan is of a pose that is no longer known."""
 MOST_SLACK = math.radians(0.7)
 """Rad off a level, at most, where the next one is far."""
+_SOME_PITCH = 0.05
+"""Rad; a pitch that needs no shift of the trunk."""
 OUT_OF_REACH = 3
 """Levels in a row that were not reached, after which the rest is taken to be out of reach."""
 
@@ -87,10 +91,18 @@ class Sweeper:
         config: range, levels and pace.
         mounts: where the LIDAR is.
         cloud: which points of a scan count.
+        legs: of the robot, to shift the trunk where they reach furthest; None: as configured.
     """
 
-    def __init__(self, config: SweepConfig, mounts: SensorMounts, cloud: CloudConfig | None = None) -> None:
+    def __init__(
+        self,
+        config: SweepConfig,
+        mounts: SensorMounts,
+        cloud: CloudConfig | None = None,
+        legs: LegGeometry | None = None,
+    ) -> None:
         self._config, self._mounts, self._cloud = config, mounts, cloud or CloudConfig()
+        self._legs = legs
         self._tolerance = math.radians(config.tolerance_deg)
         self.reset()
 
@@ -98,6 +110,8 @@ class Sweeper:
         """Forget everything: the state after ``__init__``, bit for bit."""
         self._track = PoseTrack()
         self._levels: FloatArray = np.zeros(0)
+        self._shift: FloatArray = np.zeros(3)
+        self._furthest = _SOME_PITCH
         self._heard, self._scan_time, self._fault = -math.inf, -math.inf, ""
         self._enter(_Stage.IDLE, -math.inf)
         self._wanted, self._level, self._scans = 0.0, 0, 0
@@ -142,13 +156,13 @@ class Sweeper:
         return self._step(seen)
 
     def _step(self, seen: _Seen) -> SweepStep:
-        config, done = self._config, self._stage is _Stage.IDLE
-        shifted = self._stage in (_Stage.APPROACH, _Stage.LEVELS)
+        # On the way back the shift goes with the pitch: with the nose down the legs may need it.
+        share = min(self._wanted / self._furthest, 1.0) if self._stage is _Stage.RETURN else 1.0
         return SweepStep(
-            pitch=self._wanted, done=done, reason=self._reason,
+            pitch=self._wanted, done=self._stage is _Stage.IDLE, reason=self._reason,
             points=seen.points, time=seen.time, origin=seen.origin,
             level=self._level if self._stage is _Stage.LEVELS else -1,
-            position=np.array((config.forward, 0.0, config.raised)) if shifted else np.zeros(3),
+            position=share * self._shift,
             reached=self._reached, count=len(self._levels),
         )  # fmt: skip
 
@@ -164,6 +178,7 @@ class Sweeper:
 
     def _end(self, time: float, reason: str = "") -> None:
         self._reason = "; ".join(part for part in (self._reason, reason) if part)
+        self._furthest = max(self._wanted, _SOME_PITCH)
         self._enter(_Stage.RETURN, time)
 
     def _usable(self, scan: LidarScan | None, time: float) -> LidarScan | None:
@@ -183,7 +198,10 @@ class Sweeper:
         """To the first level."""
         config = self._config
         if not len(self._levels):
-            self._levels = levels(config, estimate.height + config.raised, self._mounts.lidar[2])
+            self._shift = np.array((config.forward, 0.0, config.raised))
+            if self._legs is not None:
+                self._shift = best_shift(estimate, self._legs, config.pitch_range[1], self._shift)
+            self._levels = levels(config, estimate.height + float(self._shift[2]), self._mounts.lidar[2])
             self._wanted = min(max(float(estimate.rpy[1]), 0.0), config.pitch_range[1])
         first, pitch = float(self._levels[0]), float(estimate.rpy[1])
         self._wanted += min(max(first - self._wanted, -config.max_rate * dt), config.max_rate * dt)
@@ -245,6 +263,7 @@ class Sweeper:
         if self._wanted == 0.0 and (level or late):
             if late and not level:
                 self._reason = "; ".join(part for part in (self._reason, "the trunk is not level") if part)
+            self._shift = np.zeros(3)
             self._enter(_Stage.IDLE, time)
 
 
