@@ -37,7 +37,7 @@ class SeesAll:
     def step(self, frame, estimate, dt):
         if not self.begun:
             return SweepStep(pitch=0.0, done=True)
-        x, y = np.meshgrid(np.arange(0.4, 1.3, 0.008), np.arange(-0.7, 0.7, 0.008))
+        x, y = np.meshgrid(np.arange(0.4, 1.3, 0.006), np.arange(-0.7, 0.7, 0.006))
         c, s = math.cos(estimate.rpy[2]), math.sin(estimate.rpy[2])
         x, y = c * x - s * y + estimate.position[0], s * x + c * y + estimate.position[1]
         points = np.column_stack((x.ravel(), y.ravel(), self.world(x, y).ravel() - 0.008))
