@@ -199,3 +199,34 @@ def test_a_pose_between_two_ticks_is_on_the_way_between_them():
     assert track.at(DT).pitch == pytest.approx(0.2)
     assert track.at(-1.0).pitch == pytest.approx(0.1)
     assert track.at(9.0).pitch == pytest.approx(0.4)
+
+
+def test_a_scan_during_which_the_trunk_turned_fast_does_not_count():
+    stand = Stand()
+    stand.trust = lambda e: replace(e, angular_velocity=np.array([0.0, 0.2, 0.0]))
+    steps = stand.sweep()
+    assert "levels not reached" in steps[-1].reason
+    assert not any(len(step.points) for step in steps)
+
+
+def test_a_scan_that_comes_twice_counts_once():
+    stand = Stand(replace(FEW, dwell_scans=3))
+    kept = []
+
+    def twice(scan):
+        kept.append(scan)
+        return kept[-2] if len(kept) % 2 == 0 else scan
+
+    stand.spoil = twice
+    times = [step.time for step in stand.sweep() if len(step.points)]
+    assert len(times) > 3
+    assert len(times) == len(set(times))
+
+
+def test_the_shift_goes_with_the_pitch_on_the_way_back():
+    steps = Stand(replace(FEW, forward=-0.02)).sweep()
+    back = [step for step in steps[steps.index(next(s for s in steps if s.level == 8)) :] if step.level < 0]
+    shares = [step.trunk.position[0] / -0.02 for step in back]
+    assert shares[0] > 0.9
+    assert shares == sorted(shares, reverse=True)
+    assert [step.pitch > 0.0 for step in back] == [share > 0.0 for share in shares]
