@@ -26,7 +26,7 @@ _DID = {
     "approach": "approached the marker",
     "follow": "followed the leader",
     "sweep": "swept the ground ahead",
-    "rough": "crossed the rough ground",
+    "rough": "walked over the rough ground",
 }
 
 

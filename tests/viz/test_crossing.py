@@ -243,7 +243,7 @@ def test_figures_and_events(shown: Crossing) -> None:
 def test_every_figure_is_valid_plotly_and_the_page_small(html: str) -> None:
     page = read_page(html)
     assert set(PANELS) <= set(page.ids)
-    assert "The robot crossed the rough ground in 11 s" in html
+    assert "The robot walked over the rough ground in 11 s" in html
     figures = json.loads(page.texts["figures"])
     for key in PANELS:
         for data in [step["data"] for step in figures[key].get("steps", [figures[key]])]:
