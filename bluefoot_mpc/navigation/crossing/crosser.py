@@ -8,6 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from bluefoot_mpc.geometry import rotation_from_quaternion
+from bluefoot_mpc.model.legs import LegGeometry
 from bluefoot_mpc.model.parameters import RobotParameters
 from bluefoot_mpc.navigation.crossing.config import CrossingConfig
 from bluefoot_mpc.navigation.crossing.follower import FeetCentre, Steering, steer
@@ -83,7 +84,7 @@ class Crosser:
 
     def __init__(self, config: CrossingConfig, robot: RobotParameters) -> None:
         self._config = config
-        self._sweeper = Sweeper(config.sweep, robot.sensors, config.cloud)
+        self._sweeper = Sweeper(config.sweep, robot.sensors, config.cloud, LegGeometry.from_parameters(robot))
         self._mapper = Mapper(config, robot)
         self._thinker: Thinker[Thought] = Thinker(config.think_ticks)
         self._centre = FeetCentre(config.follower.smoothing)
@@ -169,13 +170,17 @@ class Crosser:
             return self._stand(CrossingPhase.THINK)
         self._take(thought)
         if guide.task is GuideTask.SWEEP:
-            self._stage, self._arrived = _Stage.STAY, True
+            reason = self._reason
+            self._arrive()
+            self._reason = reason
             return self._stand(CrossingPhase.ARRIVED, thought=thought)
-        self._reason = self._reason or thought.route.reason
-        if len(thought.route.poses) > 1:
+        self._reason = "; ".join(filter(None, (self._reason, thought.route.reason)))
+        if self._is_there(self._goal(guide)):
+            self._arrive()
+        elif len(thought.route.poses) > 1:
             self._stage, self._waited, self._since_thought = _Stage.WALK, 0.0, 0.0
         else:
-            self._fail(thought.route.reason or "no way was found")
+            self._look_again(self._reason or "no way was found")
         return self._stand(CrossingPhase.THINK, thought=thought)
 
     def _walk(
@@ -186,12 +191,12 @@ class Crosser:
         thought, points = self._looked_on_the_way(frame, estimate, goal, dt)
         steering = self._steer(guide, estimate)
         self._waited = self._waited + dt if feet.waiting else 0.0
-        if self._left(goal) <= 0.0:
-            self._stage, self._arrived, self._reason = _Stage.STAY, True, ""
+        if self._is_there(goal):
+            self._arrive()
         elif steering.left == 0.0:
-            self._sweep_again()
+            self._look_again(self._reason)
         elif self._waited > self._config.patience:
-            self._fail(feet.waiting)
+            self._look_again(feet.waiting)
         report = self._report(CrossingPhase.WALK, points=points, thought=thought)
         trunk = self._mapper.trunk_on_the_way(estimate.time)
         report = replace(report, speed=float(np.hypot(*steering.velocity)), pitch=float(trunk.rpy[1]))
@@ -228,20 +233,19 @@ class Crosser:
         speed = guide.speed * float(thought.pace[nearest])
         return steer(route, self._place, float(estimate.rpy[2]), speed, config)
 
-    def _sweep_again(self) -> None:
-        self._stage, self._stood = _Stage.SETTLE, 0.0
+    def _arrive(self) -> None:
+        self._stage, self._arrived, self._reason = _Stage.STAY, True, ""
 
-    def _fail(self, reason: str) -> None:
-        """Nothing came of it: look again, and after some times stay."""
+    def _look_again(self, reason: str) -> None:
+        """Sweep again; after some times without getting on, stay."""
         self._reason = reason
         progress = float(np.hypot(*(self._place - (self._place if self._origin is None else self._origin))))
         if progress > self._furthest + self._config.progress:
             self._furthest, self._fruitless = progress, 0
         self._fruitless += 1
+        self._stage, self._stood = _Stage.SETTLE, 0.0
         if self._fruitless >= self._config.attempts:
             self._stage = _Stage.STAY
-        else:
-            self._sweep_again()
 
     def _goal(self, guide: Guide) -> FloatArray:
         """(2,) m, where to in the odometry frame; ahead where none was named."""
@@ -249,12 +253,13 @@ class Crosser:
             return np.asarray(guide.waypoints[-1], dtype=np.float64)
         return self._place
 
-    def _left(self, goal: FloatArray) -> float:
-        """M to the line through the goal, across the way from where the task began."""
+    def _is_there(self, goal: FloatArray) -> bool:
+        """True at the line through the goal, across the way from where the task began, and beyond."""
         origin = self._place if self._origin is None else self._origin
         way = goal - origin
         length = float(np.hypot(*way))
-        return float((goal - self._place) @ way) / length if length > 0.0 else 0.0
+        left = float((goal - self._place) @ way) / length if length > 0.0 else 0.0
+        return left <= self._config.follower.tolerance
 
     def _pose(self, estimate: BodyState) -> FloatArray:
         """(3,) m, m, rad: where the robot is over the ground, and its heading."""

@@ -20,7 +20,7 @@ def test_even_ground_is_crossed_in_stretches(monkeypatch):
     bench = Bench(monkeypatch)
     last = bench.run(40.0)
     assert last.phase is CrossingPhase.ARRIVED
-    assert bench.pose == pytest.approx([1.5, 0.0, 0.0], abs=0.05)
+    assert bench.pose[:2] == pytest.approx([1.5, 0.0], abs=0.05)
     assert last.sweeps >= 3
     assert phases(bench)[:5] == ["sweep", "think", "walk", "sweep", "think"]
     maps = [report for report in bench.reports if report.ground is not None]
