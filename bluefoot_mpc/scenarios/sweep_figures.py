@@ -54,7 +54,9 @@ def sweep_figures(run: RunData) -> dict[str, Any]:
         if ground is not None:
             seen = _seen(ground)
             found |= {
-                "seen_within_reach_percent": covered(ground, telemetry.estimate, nearest_line(run)),
+                "seen_within_reach_percent": covered(
+                    ground, telemetry.estimate, nearest_line(run, telemetry.estimate.height)
+                ),
                 "map_cells": int(np.count_nonzero(seen & _within(ground, telemetry.estimate))),
                 **_errors(_deviations(run, k, ground)),
             }
@@ -75,11 +77,16 @@ def covered(ground: HeightMap, estimate: BodyState, nearest: float) -> float | N
     return 100.0 * float(np.count_nonzero(wanted & _seen(ground)) / count) if count else None
 
 
-def nearest_line(run: RunData) -> float:
-    """How far (m) ahead of the trunk the steepest level of a run's sweep meets level ground."""
+def nearest_line(run: RunData, height: float) -> float:
+    """How far (m) ahead of the trunk the steepest level of a run's sweep meets level ground.
+
+    Args:
+        run: the run.
+        height: m, of the trunk over the feet.
+    """
     sweep = build(SweepConfig, run.config["control"]["crossing"]["sweep"])
     lift = build(RobotParameters, run.config["model"]).sensors.lidar[2]
-    return float(line_ahead(sweep.pitch_range[1], run.telemetry[-1].estimate.height, lift))
+    return float(line_ahead(sweep.pitch_range[1], height, lift))
 
 
 def mounting_figures(run: RunData) -> dict[str, Any]:
