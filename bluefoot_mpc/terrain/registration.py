@@ -261,10 +261,11 @@ def _refined(pair: _Pair, start: FloatArray, bounds: Bounds) -> _Fit:
         if weight.sum() < bounds.overlap / 2:
             break
         noise = math.sqrt(float((weight * left * left).sum() / weight.sum()))
-        weighted = old * weight[:, None]
-        normal = weighted.T @ new
+        normal = (old * weight[:, None]).T @ new
+        slope = 0.5 * (old + new)  # of both: the same whichever map is taken to be the older
+        weighted = slope * weight[:, None]
         prior = np.diag((0.0, 0.0, 0.0, 0.0, *((noise / limit) ** 2,) * 2))
-        hessian = weighted.T @ old + prior + 1e-9 * np.eye(_PARAMETERS)
+        hessian = weighted.T @ slope + prior + 1e-9 * np.eye(_PARAMETERS)
         state = state - np.linalg.solve(hessian, weighted.T @ left + prior @ state)
     return _Fit(state, _deviation(normal, noise), noise)
 
