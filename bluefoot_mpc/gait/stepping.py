@@ -19,8 +19,8 @@ class SteppingConfig:
     """When, as shares of a swing's time, a foot on rough ground goes up, across and down."""
 
     up: float = 0.40  # by then it is highest, 1
-    depart: float = 0.15  # it begins to go across, 1
-    arrive: float = 0.75  # it is above where it lands, 1
+    depart: float = 0.12  # it begins to go across, 1
+    arrive: float = 0.82  # it is above where it lands, 1
     down: float = 0.45  # it begins to come down, 1
 
     def __post_init__(self) -> None:
