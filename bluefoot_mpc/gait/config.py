@@ -31,8 +31,8 @@ def _rough_timing() -> GaitTiming:
         swing_share=0.2,
         a_v=300.0,
         a_omega=60.0,
-        cycle_min=2.4,
-        cycle_max=2.4,
+        cycle_min=3.0,
+        cycle_max=3.0,
         height_min=0.02,
         height_max=0.03,
     )
