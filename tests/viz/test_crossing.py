@@ -13,6 +13,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from bluefoot_mpc.geometry import rotation_z
 from bluefoot_mpc.model.robot import RobotModel
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.sim.worlds.heights import heights
@@ -128,6 +129,8 @@ def test_chosen_footholds_and_landings(panels: dict[str, Panel], shown: Crossing
     swings = shown.series.swings
     assert len(swings) > 30
     for swing in swings:
+        foot = rough_run.truth[swing.landed].foot_position[swing.leg]
+        assert swing.landing[2] == pytest.approx(foot[2] - made.RADIUS, abs=1e-9)
         if not math.isfinite(swing.missed):
             continue
         chosen = [t.crossing.footholds[swing.leg] for t in rough_run.telemetry if t.crossing is not None]
@@ -157,6 +160,18 @@ def test_errors_are_those_of_the_robot_where_it_truly_stood(
     assert close[np.isfinite(expected)].mean() > 0.99
     assert np.isnan(error[np.isnan(expected)]).all()
     assert "median 1.3 mm" in panels["map-quality"].caption
+
+
+def test_what_is_believed_is_laid_where_the_robot_truly_stood(shown: Crossing) -> None:
+    series, tick = shown.series, 200
+    turn = series.turn.copy()
+    turn[tick] = rotation_z(0.3)
+    turned = dataclasses.replace(series, turn=turn)
+    # What is a metre ahead of the believed robot is a metre ahead of the true one, which looks elsewhere.
+    ahead = turned.in_world(series.estimate[tick] + np.array([1.0, 0.0, -0.1]), tick)
+    expected = series.position[tick] + np.array([math.cos(0.3), math.sin(0.3), -0.1])
+    assert ahead == pytest.approx(expected)
+    assert turned.in_world(series.estimate[tick], tick) == pytest.approx(series.position[tick])
 
 
 def test_the_cloud_is_the_robots_own(panels: dict[str, Panel], shown: Crossing, rough_run: RunData) -> None:
