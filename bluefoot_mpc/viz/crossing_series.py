@@ -99,6 +99,7 @@ class CrossingSeries:
         points: (m, 3) m, the cloud near the way, thinned, odometry frame, in order of time.
         point_time: (m,) s, from the first tick.
         seen: points before thinning.
+        touching: (n,) names of bodies other than feet that truly touched the world.
     """
 
     time: FloatArray
@@ -125,6 +126,7 @@ class CrossingSeries:
     points: FloatArray
     point_time: FloatArray
     seen: int
+    touching: tuple[tuple[str, ...], ...]
 
     @property
     def reports(self) -> BoolArray:
@@ -192,6 +194,7 @@ def extract_crossing(run: RunData, series: RunSeries, foot_radius: float) -> Cro
         points=points - rise,
         point_time=point_time - telemetry[0].time,
         seen=seen,
+        touching=tuple(t.touching for t in run.truth[:n]) if series.has_truth else ((),) * n,
     )
 
 

@@ -75,7 +75,7 @@ def _scene(crossing: CrossingSeries) -> dict[str, Any]:
         "zaxis": {**axis, "title": {"text": "z (m)"}, "nticks": 4},
         "aspectmode": "manual",
         "aspectratio": {"x": ratio[0], "y": ratio[1], "z": ratio[2]},
-        "camera": {"eye": {"x": -1.3, "y": -1.55, "z": 1.15}, "center": {"x": 0.0, "y": 0.0, "z": -0.15}},
+        "camera": {"eye": {"x": -1.4, "y": -1.65, "z": 1.25}, "center": {"x": 0.0, "y": 0.0, "z": -0.15}},
     }
 
 

@@ -11,10 +11,11 @@ from bluefoot_mpc.types import LEGS, FloatArray
 from bluefoot_mpc.viz.crossing_series import CrossingSeries
 from bluefoot_mpc.viz.crossing_truth import Profile
 from bluefoot_mpc.viz.packing import pack, stretches, stride_for
-from bluefoot_mpc.viz.plots import LIMIT, Panel, Trace, curve, name_rows
+from bluefoot_mpc.viz.plots import LIMIT, Panel, Trace, band, curve, name_rows
 from bluefoot_mpc.viz.plots_way import smoothed
 from bluefoot_mpc.viz.series import RunSeries
 from bluefoot_mpc.viz.style import (
+    BAD,
     COMMAND,
     ESTIMATE,
     LEG_COLOURS,
@@ -26,6 +27,8 @@ from bluefoot_mpc.viz.verdict import number
 
 _MEAN = 1.2
 """s over which achieved speed is averaged: a cycle of the walk."""
+_MOST_TOUCHES = 200
+"""Stretches in which the body touches the ground that a figure marks."""
 _BAND, _GAP = 0.035, 0.055
 """Shares of a figure's height: the band of phases, and what lies between two rows."""
 
@@ -44,6 +47,10 @@ def phases_over_time(series: RunSeries, crossing: CrossingSeries, period: float)
         elif not title.startswith("pitch"):
             axis["rangemode"] = "tozero"
         traces += [{**trace, "yaxis": f"y{row + 2}"} for trace in own]
+    touches = np.array([bool(names) for names in crossing.touching], dtype=np.bool_)
+    layout["shapes"] = [band(*span, BAD) for span in stretches(touches, crossing.time, period)][
+        :_MOST_TOUCHES
+    ]
     return Panel(
         key="crossing", title="Crossing", data=traces, layout=layout, wide=True,
         height=120 + 130 * len(drawn),
@@ -167,6 +174,8 @@ def _caption(crossing: CrossingSeries) -> str:
     if blocked:
         reason = next((crossing.reason[k] for k in blocked if crossing.reason[k]), "no reason given")
         said.append(f"Blocked at {crossing.time[blocked[0]]:.1f} s: {reason}.")
+    if any(crossing.touching):
+        said.append("Red: a part of the robot other than its feet touches the ground.")
     known = crossing.drift[np.isfinite(crossing.drift)]
     moved = f", which corrected older maps by up to {1e3 * known.max():.0f} mm" if known.any() else ""
     said.append(f"{crossing.sweeps} sweep{'' if crossing.sweeps == 1 else 's'}{moved}.")

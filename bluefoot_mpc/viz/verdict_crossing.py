@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +13,9 @@ from bluefoot_mpc.viz.verdict_way import figure_tiles
 
 CROSSING = "crossing: "
 """Start of what the controller itself tells of crossing; `crossing_events` tells more."""
+
+_APART = 1.0
+"""s between two touches of the ground that are told apart."""
 
 _FIGURES = (
     ("goal_left_m", "Short of the goal line", 2, "m", "at best; below 0 is beyond it"),
@@ -39,7 +43,7 @@ def crossing_tiles(summary: Mapping[str, Any], checks: Sequence[Mapping[str, Any
 
 
 def crossing_events(crossing: CrossingSeries) -> list[tuple[float, str]]:
-    """Time (s) and text of phases with their reasons, and of corrections of the map."""
+    """Time (s) and text of phases and their reasons, of touches, and of corrections of the map."""
     found: list[tuple[float, str]] = []
     before = ("", "")
     for k, (name, reason) in enumerate(zip(crossing.phase, crossing.reason, strict=True)):
@@ -47,6 +51,11 @@ def crossing_events(crossing: CrossingSeries) -> list[tuple[float, str]]:
             text = f"{CROSSING}{PHASE_NAMES.get(name, name)}"
             found.append((float(crossing.time[k]), f"{text} ({reason})" if reason else text))
         before = (name, reason)
+    last = -math.inf
+    for time, names in zip(crossing.time.tolist(), crossing.touching, strict=True):
+        if names and time - last > _APART:
+            found.append((time, f"touches the ground with {', '.join(names)}"))
+        last = time if names else last
     for entry in crossing.maps[1:]:
         moved = crossing.drift[entry.tick]
         if moved > 0.0:

@@ -255,6 +255,19 @@ def test_figures_and_events(shown: Crossing) -> None:
     ]  # fmt: skip
 
 
+def test_what_touches_the_ground_is_told_and_marked(rough_run: RunData, robot: RobotModel) -> None:
+    truth = list(rough_run.truth)
+    for k in (*range(200, 230), *range(300, 310)):
+        truth[k] = dataclasses.replace(truth[k], touching=("FL_shin",))
+    found = crossing(dataclasses.replace(rough_run, truth=truth), robot)
+    panel = next(panel for panel in found.panels if panel.key == "crossing")
+    spans = [(shape["x0"], shape["x1"]) for shape in panel.layout["shapes"]]
+    assert spans == [pytest.approx((4.0, 4.6)), pytest.approx((6.0, 6.2))]
+    assert "Red: a part of the robot" in panel.caption
+    told = [(round(time, 2), text) for time, text in crossing_events(found.series) if "touches" in text]
+    assert told == [(4.0, "touches the ground with FL_shin"), (6.0, "touches the ground with FL_shin")]
+
+
 def test_every_figure_is_valid_plotly_and_the_page_small(html: str) -> None:
     page = read_page(html)
     assert set(PANELS) <= set(page.ids)
