@@ -14,6 +14,8 @@ _CELL = 0.004
 _BENT = math.radians(15.0)
 """rad that the knee stays bent by, and the room besides."""
 _DIRECTIONS = np.radians(np.arange(-175.0, 1.0, 2.5))
+_UPRIGHT = np.radians(np.arange(-126.0, -49.0, 2.0))
+"""rad, of the last link: one that leans farther lies on what is beside the foot."""
 
 
 class LegReach:
@@ -26,17 +28,26 @@ class LegReach:
     def __init__(self, geometry: LegGeometry) -> None:
         self._hips = geometry.hips
         self._bounds = geometry.bounds
-        self._tables = [
-            _table(geometry.links, geometry.bounds[4 * leg + 1 : 4 * leg + 4]) for leg in range(4)
-        ]
+        bounds = [geometry.bounds[4 * leg + 1 : 4 * leg + 4] for leg in range(4)]
+        self._tables = [[_table(geometry.links, own, upright) for upright in (False, True)] for own in bounds]
 
-    def holds(self, leg: int, feet: FloatArray, room: float) -> BoolArray:
-        """(k,) whether the leg is at (k, 3) places, m in the trunk's axes, with `room` rad to its limits."""
+    def holds(self, leg: int, feet: FloatArray, room: float, upright: bool = False) -> BoolArray:
+        """Whether a leg holds places.
+
+        Args:
+            leg: index.
+            feet: (k, 3) m from the trunk's origin, in its axes.
+            room: rad that must be left to the limits.
+            upright: with a last link that stands rather than leans.
+
+        Returns:
+            (k,) True where it does.
+        """
         hip = self._hips[leg]
         x, y, z = (feet[:, axis] - offset for axis, offset in enumerate((hip.x, hip.y, hip.z)))
         low, high = self._bounds[4 * leg]
         yaw = (np.arctan2(y, x) - hip.azimuth + math.pi) % (2.0 * math.pi) - math.pi
-        table, least_z = self._tables[leg]
+        table, least_z = self._tables[leg][upright]
         row = (np.hypot(x, y) / _CELL).astype(np.intp)
         column = np.floor((z - least_z) / _CELL).astype(np.intp)
         inside = (row < table.shape[0]) & (column >= 0) & (column < table.shape[1])
@@ -46,7 +57,7 @@ class LegReach:
 
 @functools.lru_cache(maxsize=8)
 def _table(
-    links: tuple[float, float, float, float], bounds: tuple[tuple[float, float], ...]
+    links: tuple[float, float, float, float], bounds: tuple[tuple[float, float], ...], upright: bool
 ) -> tuple[FloatArray, float]:
     """Least room to a limit, rad (-inf out of reach), outward by upward cells; and the lowest cell's height."""
     length = sum(links)
@@ -54,7 +65,7 @@ def _table(
     count = math.ceil(1.3 * length / _CELL)
     least_z = -length
     upward = least_z + (np.arange(count) + 0.5) * _CELL
-    r, z, gamma = np.meshgrid(outward, upward, _DIRECTIONS, indexing="ij")
+    r, z, gamma = np.meshgrid(outward, upward, _UPRIGHT if upright else _DIRECTIONS, indexing="ij")
     _, a2, a3, a4 = links
     reach, rise = r - links[0] - a4 * np.cos(gamma), z - a4 * np.sin(gamma)
     cosine = (reach**2 + rise**2 - a2 * a2 - a3 * a3) / (2.0 * a2 * a3)

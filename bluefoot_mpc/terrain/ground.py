@@ -16,19 +16,17 @@ class RatingConfig:
     """What makes a good place for a foot."""
 
     least_confidence: float = 0.2  # below it a height is no better than unknown, 1
-    sole: float = 0.010  # m around a place that must be known and level
-    level: float = 0.010  # m that heights within the sole may differ by
-    brink: float = 0.018  # m around a place, in which the ground should not fall away
-    drop: float = 0.010  # m by which it may fall there
-    shank: float = 0.026  # m around a place, in which nothing should rise: the last link leans outward
-    rise: float = 0.012  # m by which it may rise there
+    edge: float = 0.008  # m by which heights of neighbouring cells differ where there is an edge
+    least_distance: float = 0.010  # m from an edge or from unknown ground; nearer no foot stands
+    distance: float = 0.045  # m from it; farther no place gets better
     slope: float = 0.5  # rise per metre, steepest place to stand on
 
     def __post_init__(self) -> None:
         """Check ranges."""
         require_range(0.0, 1.0, least_confidence=self.least_confidence)
-        require_nonnegative(sole=self.sole, brink=self.brink, shank=self.shank)
-        require_positive(level=self.level, drop=self.drop, rise=self.rise, slope=self.slope)
+        require_nonnegative(least_distance=self.least_distance)
+        require_positive(edge=self.edge, slope=self.slope)
+        require_range(self.least_distance + 1e-3, 1.0, distance=self.distance)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -47,8 +45,8 @@ class Ground:
 def rate_ground(map: HeightMap, config: RatingConfig | None = None) -> Ground:
     """Rate every cell of a map.
 
-    Unknown ground, and what is next to it, gets nothing. Brinks, bumps, slopes and neighbours that rise
-    make a place worse, up to a bound beyond which it is none.
+    A map shows edges a finger's width from where they are, feet land a little beside their places, and the
+    last link leans over what stands beside: so a place is the better the farther it is from any edge.
 
     Args:
         map: heights and how far they are to be trusted.
@@ -58,28 +56,31 @@ def rate_ground(map: HeightMap, config: RatingConfig | None = None) -> Ground:
     known = np.isfinite(map.height) & (map.confidence >= config.least_confidence)
     if not known.any():
         return Ground(map=map, quality=np.zeros(map.height.shape))
-    high = np.where(known, map.height, -np.inf)
-    low = np.where(known, map.height, np.inf)
-    sole, brink, shank = (_disc(radius, map.cell) for radius in (config.sole, config.brink, config.shank))
-    height = np.where(known, map.height, 0.0)
-    bump = ndimage.maximum_filter(high, footprint=sole) - ndimage.minimum_filter(low, footprint=sole)
-    fall = height - ndimage.minimum_filter(low, footprint=brink)
-    climb = ndimage.maximum_filter(high, footprint=shank) - height
-    slope = _slope(height, known, map.cell)
-    quality = np.ones(map.height.shape)
-    pairs = ((bump, config.level), (fall, config.drop), (climb, config.rise), (slope, config.slope))
-    for value, most in pairs:
-        quality *= np.clip(1.0 - np.where(known, value / most, 1.0), 0.0, 1.0) ** 0.5
-    sure = ndimage.minimum_filter(known, footprint=sole, mode="constant", cval=False)
-    quality *= np.where(sure, np.clip(map.confidence, 0.0, 1.0), 0.0)
-    return Ground(map=map, quality=quality)
+    height, even = _bridged(map.height, known, config.edge)
+    high = ndimage.maximum_filter(np.where(even, height, -np.inf), size=3)
+    low = ndimage.minimum_filter(np.where(even, height, np.inf), size=3)
+    free = even & (high - low <= config.edge)
+    away = map.cell * (ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] - 0.5)
+    reach = config.distance - config.least_distance
+    quality = np.clip((away - config.least_distance) / reach, 0.0, 1.0)
+    slope = _slope(np.where(even, height, 0.0), even, map.cell)
+    quality *= np.clip(2.0 - 2.0 * slope / config.slope, 0.0, 1.0) * np.clip(
+        0.5 + 0.5 * map.confidence, 0.0, 1.0
+    )
+    return Ground(map=map, quality=np.where(free & known, quality, 0.0))
 
 
-def _disc(radius: float, cell: float) -> BoolArray:
-    """(k, k) True for cells whose centres are within `radius` m."""
-    reach = int(radius / cell + 1e-9)
-    away = np.arange(-reach, reach + 1) * cell
-    return np.asarray(np.hypot(away[:, None], away[None, :]) <= radius + 1e-9)
+def _bridged(height: FloatArray, known: BoolArray, edge: float) -> tuple[FloatArray, BoolArray]:
+    """Heights with small holes filled where all around agrees, and which cells have one then.
+
+    Nobody steps into such a hole, but next to it: it is narrower than a foot.
+    """
+    around = np.ones((5, 5), dtype=np.bool_)
+    high = ndimage.maximum_filter(np.where(known, height, -np.inf), footprint=around)
+    low = ndimage.minimum_filter(np.where(known, height, np.inf), footprint=around)
+    count = ndimage.uniform_filter(known.astype(np.float64), size=5, mode="constant") * 25.0
+    hole = ~known & (count >= 11.5) & (high - low <= edge)
+    return np.where(hole, 0.5 * (np.where(hole, high, 0.0) + np.where(hole, low, 0.0)), height), known | hole
 
 
 def _slope(height: FloatArray, known: BoolArray, cell: float) -> FloatArray:
