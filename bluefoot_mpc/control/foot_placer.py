@@ -36,7 +36,7 @@ class PlacerConfig:
     choice: ChoiceConfig = field(default_factory=ChoiceConfig)
     touch: TouchConfig = field(default_factory=TouchConfig)
     room: float = 0.07  # rad that legs keep to their limits where they land and lift
-    sway: float = 0.018  # m by which the trunk sways to and from a foot
+    sway: float = 0.026  # m by which the trunk sways to and from a foot
     clearance: float = 0.018  # m above all that a swing passes over
     least_lift: float = 0.020  # m above where a foot stands, and where it lands
     shuffle: float = 0.030  # m, farthest that a foot steps which has nowhere to go
@@ -50,9 +50,10 @@ class PlacerConfig:
     learn_after: float = 0.1  # s after a landing, when its miss is measured
     learn_most: float = 0.012  # m, largest such move
     level_time: float = 0.4  # s, with which the trunk follows the mean height of the feet
-    slow: float = 0.060  # m behind its place, from which a standing foot slows the walk
+    speed: float = 0.020  # m/s, that the walk may take up again while a foot stands
+    slow: float = 0.90  # share of a leg's length by which it is stretched that slows the walk, 1
     creep: float = 0.05  # share of the speed that is left then: without any the gait would end
-    stop: float = 0.085  # m behind its place, at which it stops it
+    stop: float = 0.97  # share at which it stops it, 1
 
     def __post_init__(self) -> None:
         """Check ranges."""
@@ -100,6 +101,7 @@ class FootPlacer:
         self.level = 0.0
         self._aim = np.full((4, 3), np.nan)  # where feet in the air go to
         self.pace = 1.0
+        self._stretch = 0.0
 
     def step(self, ground: Ground | None, estimate: BodyState, gait: Gait, dt: float) -> None:
         """Take one tick's ground and estimate, before the gait advances.
@@ -126,6 +128,7 @@ class FootPlacer:
         self._next = (self._next + 1) % 4
         self._plan(ground, places, gait, self._next)
         self.waiting = next((reason for reason in self._reasons if reason), "")
+        self._stretch = self._reach.stretch(estimate.foot_position_in_base, gait.state)
         self._follow_feet(gait, dt)
 
     def _learn(self, places: FloatArray, yaw: float, gait: Gait, dt: float) -> None:
@@ -185,7 +188,10 @@ class FootPlacer:
             return
         swing, stance = state.rhythm.share * state.cycle, (1.0 - state.rhythm.share) * state.cycle
         landing = state.pose.moved(state.velocity, state.yaw_rate, wait + swing)
-        lifting = landing.moved(state.velocity, state.yaw_rate, stance)
+        # The walk may go faster by then than it does now.
+        speed = abs(state.velocity)
+        faster = max(1.0, self._config.speed / speed) if speed > 1e-3 else 1.0
+        lifting = landing.moved(faster * state.velocity, state.yaw_rate, stance)
         lead = foot.shape.stance_lead * stance
         nominal = landing.to_world(carried(foot.nominal, state.velocity, state.yaw_rate, lead))
 
@@ -244,12 +250,6 @@ class FootPlacer:
         if speed == 0.0:
             self.pace = 1.0
             return
-        along = (state.wanted or state.velocity) / speed
-        behind = [
-            -((foot.in_b(state.pose) - foot.nominal) * along.conjugate()).real
-            for foot in state.feet if not foot.swinging
-        ]  # fmt: skip
-        worst = max(behind, default=0.0)
-        share = min(1.0, max(0.0, (config.stop - worst) / (config.stop - config.slow)))
+        share = min(1.0, max(0.0, (config.stop - self._stretch) / (config.stop - config.slow)))
         # While a foot has nowhere to go the others step on the spot: under way legs would be left behind.
         self.pace = max(config.creep, 0.0 if self.waiting else share)

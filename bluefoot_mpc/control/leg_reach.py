@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from bluefoot_mpc.gait.state import GaitState
 from bluefoot_mpc.model.legs import LegGeometry
 from bluefoot_mpc.types import BoolArray, FloatArray
 
@@ -28,8 +29,26 @@ class LegReach:
     def __init__(self, geometry: LegGeometry) -> None:
         self._hips = geometry.hips
         self._bounds = geometry.bounds
+        self._links = geometry.links
         bounds = [geometry.bounds[4 * leg + 1 : 4 * leg + 4] for leg in range(4)]
         self._tables = [[_table(geometry.links, own, upright) for upright in (False, True)] for own in bounds]
+
+    def stretch(self, feet: FloatArray, state: GaitState) -> float:
+        """Greatest share of its length by which a standing leg is stretched that the motion stretches more.
+
+        Args:
+            feet: (4, 3) m from the trunk's origin, in its axes.
+            state: of the gait: which feet stand, and where it goes.
+        """
+        worst = 0.0
+        heading = state.wanted or state.velocity
+        for leg, (foot, (x, y, z)) in enumerate(zip(state.feet, feet.tolist(), strict=True)):
+            hip = self._hips[leg]
+            away = complex(x - hip.x, y - hip.y)
+            if foot.swinging or (away * heading.conjugate()).real >= 0.0:
+                continue
+            worst = max(worst, math.hypot(abs(away) - self._links[0], z - hip.z) / sum(self._links[1:]))
+        return worst
 
     def holds(self, leg: int, feet: FloatArray, room: float, upright: bool = False) -> BoolArray:
         """Whether a leg holds places.
