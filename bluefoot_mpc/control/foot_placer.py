@@ -228,14 +228,14 @@ class FootPlacer:
     ) -> BoolArray:
         """(k,) whether the leg holds (k, 3) places of the gait's world while the virtual robot is at `pose`.
 
-        Where it leans, only a trunk that sways away counts; upright it must stand whichever way it sways.
+        It must do so whichever way the trunk sways: near its hip a leg is folded as far as it goes.
         """
         local = (places[:, 0] + 1j * places[:, 1] - pose.centre) * cmath.rect(1.0, -pose.yaw)
         nominal, style = gait.state.feet[leg].nominal, gait.state.style
         sway = self._config.sway * nominal / abs(nominal)
         z = places[:, 2] - self.level - style.trunk_height
         held = np.ones(len(places), dtype=np.bool_)
-        for aside in (sway, -sway) if upright else (sway,):
+        for aside in (sway, -sway):
             away = local - style.trunk_forward + aside
             feet = np.column_stack([away.real, away.imag, z])
             held &= self._reach.holds(leg, feet, self._config.room, upright)

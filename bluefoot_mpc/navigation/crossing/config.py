@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from bluefoot_mpc.navigation.crossing.follower import FollowerConfig
 from bluefoot_mpc.navigation.crossing.pace import PaceConfig
 from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
 from bluefoot_mpc.terrain.cloud import CloudConfig
+from bluefoot_mpc.terrain.cost import CostConfig
 from bluefoot_mpc.terrain.free_space import FreeSpaceConfig
 from bluefoot_mpc.terrain.ground import RatingConfig
 from bluefoot_mpc.terrain.height_map import MapConfig
@@ -15,20 +17,32 @@ from bluefoot_mpc.terrain.merge import MergeConfig
 from bluefoot_mpc.terrain.plan import PlanConfig
 from bluefoot_mpc.terrain.registration import Bounds
 from bluefoot_mpc.terrain.sweep import SweepConfig
+from bluefoot_mpc.terrain.treads import TreadConfig
+
+
+_PLAN = PlanConfig(
+    even_radius=0.0,
+    k_side=5.0,
+    cost=CostConfig(spacing=0.316, k_yaw=10.0, yaw_range=math.radians(20.0)),
+    treads=TreadConfig(reach=0.065, least_quality=0.05),
+)
+"""A way as straight as feet can be placed along it: a crawl follows no wiggles."""
+_SWEEP = SweepConfig(dwell_scans=2, pitch_max_deg=34.0)
+"""Twice as many points; and so far down that what is seen begins within the ground taken to be even."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class CrossingConfig:
     """Configuration of each part, and of what ties them together."""
 
-    sweep: SweepConfig = field(default_factory=lambda: SweepConfig(dwell_scans=2))
+    sweep: SweepConfig = field(default_factory=lambda: _SWEEP)
     cloud: CloudConfig = field(default_factory=CloudConfig)
     map: MapConfig = field(default_factory=MapConfig)
     merge: MergeConfig = field(default_factory=MergeConfig)
     free_space: FreeSpaceConfig = field(default_factory=FreeSpaceConfig)
     align: Bounds = field(default_factory=Bounds)
     rating: RatingConfig = field(default_factory=RatingConfig)
-    plan: PlanConfig = field(default_factory=lambda: PlanConfig(even_radius=0.0))
+    plan: PlanConfig = field(default_factory=lambda: _PLAN)
     pace: PaceConfig = field(default_factory=PaceConfig)
     follower: FollowerConfig = field(default_factory=FollowerConfig)
     start_radius: float = 0.45  # m around the feet at the start, within which the ground is taken to be even
@@ -39,7 +53,7 @@ class CrossingConfig:
     stretch: float = 0.50  # m that are walked from one sweep to the next
     settle_time: float = 0.3  # s for which all feet rest before a sweep
     think_ticks: int = 20  # command periods for mapping and planning
-    patience: float = 3.0  # s that a foot may have nowhere to step before the robot looks again
+    patience: float = 6.0  # s that a foot may have nowhere to step before the robot looks again
     attempts: int = 3  # fruitless sweeps in a row after which it stays
     progress: float = 0.05  # m that count as fruit
     incremental: bool = False  # map while walking, rather than stop and sweep
