@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -36,24 +36,18 @@ class PlacerConfig:
     choice: ChoiceConfig = field(default_factory=ChoiceConfig)
     touch: TouchConfig = field(default_factory=TouchConfig)
     room: float = 0.07  # rad that legs keep to their limits where they land and lift
-    sway: float = 0.026  # m by which the trunk sways to and from a foot
-    clearance: float = 0.018  # m above all that a swing passes over
+    sway: float = 0.020  # m that the trunk may be farther from a foot that lands or lifts
+    clearance: float = 0.015  # m above all that a swing passes over
     least_lift: float = 0.020  # m above where a foot stands, and where it lands
-    shuffle: float = 0.030  # m, farthest that a foot steps which has nowhere to go
-    usual: float = 0.085  # m, of a step; longer ones are taken where nothing else will do
-    longest: float = 0.125  # m, of a step: servos are not faster
-    leaning: float = 0.6  # what a place costs at which the last link leans far outward, 1
-    width: float = 0.060  # m, of the way that a swing must clear
+    width: float = 0.036  # m, of the way that a swing must clear
     decided: float = 0.06  # s before lift-off, from which the choice stays
     follow: float = 0.3  # s, time constant of the shift between odometry and gait
     learn: float = 0.3  # share of a foot's miss by which its next goals are moved the other way
     learn_after: float = 0.1  # s after a landing, when its miss is measured
     learn_most: float = 0.012  # m, largest such move
     level_time: float = 0.4  # s, with which the trunk follows the mean height of the feet
-    speed: float = 0.020  # m/s, that the walk may take up again while a foot stands
-    slow: float = 0.90  # share of a leg's length by which it is stretched that slows the walk, 1
-    creep: float = 0.05  # share of the speed that is left then: without any the gait would end
-    stop: float = 0.97  # share at which it stops it, 1
+    slow: float = 0.060  # m behind its place, from which a standing foot slows the walk
+    stop: float = 0.085  # m behind its place, at which it stops it
 
     def __post_init__(self) -> None:
         """Check ranges."""
@@ -101,7 +95,6 @@ class FootPlacer:
         self.level = 0.0
         self._aim = np.full((4, 3), np.nan)  # where feet in the air go to
         self.pace = 1.0
-        self._stretch = 0.0
 
     def step(self, ground: Ground | None, estimate: BodyState, gait: Gait, dt: float) -> None:
         """Take one tick's ground and estimate, before the gait advances.
@@ -128,7 +121,6 @@ class FootPlacer:
         self._next = (self._next + 1) % 4
         self._plan(ground, places, gait, self._next)
         self.waiting = next((reason for reason in self._reasons if reason), "")
-        self._stretch = self._reach.stretch(estimate.foot_position_in_base, gait.state)
         self._follow_feet(gait, dt)
 
     def _learn(self, places: FloatArray, yaw: float, gait: Gait, dt: float) -> None:
@@ -188,30 +180,19 @@ class FootPlacer:
             return
         swing, stance = state.rhythm.share * state.cycle, (1.0 - state.rhythm.share) * state.cycle
         landing = state.pose.moved(state.velocity, state.yaw_rate, wait + swing)
-        # The walk may go faster by then than it does now.
-        speed = abs(state.velocity)
-        faster = max(1.0, self._config.speed / speed) if speed > 1e-3 else 1.0
-        lifting = landing.moved(faster * state.velocity, state.yaw_rate, stance)
+        lifting = landing.moved(state.velocity, state.yaw_rate, stance)
         lead = foot.shape.stance_lead * stance
         nominal = landing.to_world(carried(foot.nominal, state.velocity, state.yaw_rate, lead))
 
-        def effort(candidates: FloatArray) -> FloatArray:
+        def holds(candidates: FloatArray) -> BoolArray:
             moved = self._to_gait(candidates)
-            length = np.hypot(moved[:, 0] - foot.anchor.real, moved[:, 1] - foot.anchor.imag)
-            held = self._held(gait, leg, moved, landing) & self._held(gait, leg, moved, lifting)
-            easy = self._held(gait, leg, moved, landing, True) & self._held(gait, leg, moved, lifting, True)
-            cost = np.where(easy, 0.0, self._config.leaning)
-            cost += (np.maximum(length - self._config.usual, 0.0) / self._config.usual) ** 2 * 4.0
-            return np.where(held & (length <= self._config.longest), cost, np.inf)
+            return self._held(gait, leg, moved, landing) & self._held(gait, leg, moved, lifting)
 
-        last = self.footholds[leg, :2] if foot.goal is not None else None
-        choice = choose(ground, self._from_gait(nominal), effort, last, self._config.choice)
+        last = self.footholds[leg, :2] if foot.goal is not None and not self._reasons[leg] else None
+        choice = choose(ground, self._from_gait(nominal), holds, last, self._config.choice)
         self._reasons[leg] = "" if choice.found else f"{LEGS[leg]}: {choice.reason}"
-        if not choice.found:  # then it steps where it stands, or on the best that is next to it
-            near = replace(self._config.choice, radius=self._config.shuffle, least_quality=0.0)
-            choice = choose(ground, places[leg, :2], effort, last, near)
-        config = self._config
         self.footholds[leg] = choice.place
+        config = self._config
         if not choice.found:
             self.lift[leg] = config.least_lift
             gait.plan_step(leg, foot.anchor, foot.z, foot.z + config.least_lift)
@@ -223,23 +204,15 @@ class FootPlacer:
         self.lift[leg] = top - foot.z
         gait.plan_step(leg, complex(goal[0], goal[1]) - bias, float(goal[2]), top)
 
-    def _held(
-        self, gait: Gait, leg: int, places: FloatArray, pose: VirtualPose, upright: bool = False
-    ) -> BoolArray:
-        """(k,) whether the leg holds (k, 3) places of the gait's world while the virtual robot is at `pose`.
-
-        It must do so whichever way the trunk sways: near its hip a leg is folded as far as it goes.
-        """
+    def _held(self, gait: Gait, leg: int, places: FloatArray, pose: VirtualPose) -> BoolArray:
+        """(k,) whether the leg holds (k, 3) places of the gait's world while the virtual robot is at `pose`."""
         local = (places[:, 0] + 1j * places[:, 1] - pose.centre) * cmath.rect(1.0, -pose.yaw)
-        nominal, style = gait.state.feet[leg].nominal, gait.state.style
-        sway = self._config.sway * nominal / abs(nominal)
+        nominal = gait.state.feet[leg].nominal
+        away = self._config.sway * nominal / abs(nominal)
+        style = gait.state.style
+        x, y = local.real + away.real - style.trunk_forward, local.imag + away.imag
         z = places[:, 2] - self.level - style.trunk_height
-        held = np.ones(len(places), dtype=np.bool_)
-        for aside in (sway, -sway):
-            away = local - style.trunk_forward + aside
-            feet = np.column_stack([away.real, away.imag, z])
-            held &= self._reach.holds(leg, feet, self._config.room, upright)
-        return held
+        return self._reach.holds(leg, np.column_stack([x, y, z]), self._config.room)
 
     def _follow_feet(self, gait: Gait, dt: float) -> None:
         """Height of the trunk's plane, and how fast the walk may go on."""
@@ -250,6 +223,10 @@ class FootPlacer:
         if speed == 0.0:
             self.pace = 1.0
             return
-        share = min(1.0, max(0.0, (config.stop - self._stretch) / (config.stop - config.slow)))
-        # While a foot has nowhere to go the others step on the spot: under way legs would be left behind.
-        self.pace = max(config.creep, 0.0 if self.waiting else share)
+        along = (state.wanted or state.velocity) / speed
+        behind = [
+            -((foot.in_b(state.pose) - foot.nominal) * along.conjugate()).real
+            for foot in state.feet if not foot.swinging
+        ]  # fmt: skip
+        worst = max(behind, default=0.0)
+        self.pace = min(1.0, max(0.0, (config.stop - worst) / (config.stop - config.slow)))

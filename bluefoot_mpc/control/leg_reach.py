@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 
-from bluefoot_mpc.gait.state import GaitState
 from bluefoot_mpc.model.legs import LegGeometry
 from bluefoot_mpc.types import BoolArray, FloatArray
 
@@ -15,8 +14,6 @@ _CELL = 0.004
 _BENT = math.radians(15.0)
 """rad that the knee stays bent by, and the room besides."""
 _DIRECTIONS = np.radians(np.arange(-175.0, 1.0, 2.5))
-_UPRIGHT = np.radians(np.arange(-126.0, -49.0, 2.0))
-"""rad, of the last link: one that leans farther lies on what is beside the foot."""
 
 
 class LegReach:
@@ -29,44 +26,17 @@ class LegReach:
     def __init__(self, geometry: LegGeometry) -> None:
         self._hips = geometry.hips
         self._bounds = geometry.bounds
-        self._links = geometry.links
-        bounds = [geometry.bounds[4 * leg + 1 : 4 * leg + 4] for leg in range(4)]
-        self._tables = [[_table(geometry.links, own, upright) for upright in (False, True)] for own in bounds]
+        self._tables = [
+            _table(geometry.links, geometry.bounds[4 * leg + 1 : 4 * leg + 4]) for leg in range(4)
+        ]
 
-    def stretch(self, feet: FloatArray, state: GaitState) -> float:
-        """Greatest share of its length by which a standing leg is stretched that the motion stretches more.
-
-        Args:
-            feet: (4, 3) m from the trunk's origin, in its axes.
-            state: of the gait: which feet stand, and where it goes.
-        """
-        worst = 0.0
-        heading = state.wanted or state.velocity
-        for leg, (foot, (x, y, z)) in enumerate(zip(state.feet, feet.tolist(), strict=True)):
-            hip = self._hips[leg]
-            away = complex(x - hip.x, y - hip.y)
-            if foot.swinging or (away * heading.conjugate()).real >= 0.0:
-                continue
-            worst = max(worst, math.hypot(abs(away) - self._links[0], z - hip.z) / sum(self._links[1:]))
-        return worst
-
-    def holds(self, leg: int, feet: FloatArray, room: float, upright: bool = False) -> BoolArray:
-        """Whether a leg holds places.
-
-        Args:
-            leg: index.
-            feet: (k, 3) m from the trunk's origin, in its axes.
-            room: rad that must be left to the limits.
-            upright: with a last link that stands rather than leans.
-
-        Returns:
-            (k,) True where it does.
-        """
+    def holds(self, leg: int, feet: FloatArray, room: float) -> BoolArray:
+        """(k,) whether the leg is at (k, 3) places, m in the trunk's axes, with `room` rad to its limits."""
         hip = self._hips[leg]
         x, y, z = (feet[:, axis] - offset for axis, offset in enumerate((hip.x, hip.y, hip.z)))
         low, high = self._bounds[4 * leg]
         yaw = (np.arctan2(y, x) - hip.azimuth + math.pi) % (2.0 * math.pi) - math.pi
-        table, least_z = self._tables[leg][upright]
+        table, least_z = self._tables[leg]
         row = (np.hypot(x, y) / _CELL).astype(np.intp)
         column = np.floor((z - least_z) / _CELL).astype(np.intp)
         inside = (row < table.shape[0]) & (column >= 0) & (column < table.shape[1])
@@ -76,7 +46,7 @@ class LegReach:
 
 @functools.lru_cache(maxsize=8)
 def _table(
-    links: tuple[float, float, float, float], bounds: tuple[tuple[float, float], ...], upright: bool
+    links: tuple[float, float, float, float], bounds: tuple[tuple[float, float], ...]
 ) -> tuple[FloatArray, float]:
     """Least room to a limit, rad (-inf out of reach), outward by upward cells; and the lowest cell's height."""
     length = sum(links)
@@ -84,7 +54,7 @@ def _table(
     count = math.ceil(1.3 * length / _CELL)
     least_z = -length
     upward = least_z + (np.arange(count) + 0.5) * _CELL
-    r, z, gamma = np.meshgrid(outward, upward, _UPRIGHT if upright else _DIRECTIONS, indexing="ij")
+    r, z, gamma = np.meshgrid(outward, upward, _DIRECTIONS, indexing="ij")
     _, a2, a3, a4 = links
     reach, rise = r - links[0] - a4 * np.cos(gamma), z - a4 * np.sin(gamma)
     cosine = (reach**2 + rise**2 - a2 * a2 - a3 * a3) / (2.0 * a2 * a3)

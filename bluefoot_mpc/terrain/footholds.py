@@ -11,10 +11,10 @@ import numpy as np
 from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
 from bluefoot_mpc.terrain.frame import cells_of, heights_at, to_map, to_world
 from bluefoot_mpc.terrain.ground import Ground
-from bluefoot_mpc.types import FloatArray
+from bluefoot_mpc.types import BoolArray, FloatArray
 
-Effort = Callable[[FloatArray], FloatArray]
-"""(k,) what it costs a leg to stand at each of (k, 3) places, m in the odometry frame; infinite out of reach."""
+Reach = Callable[[FloatArray], BoolArray]
+"""(k,) whether a leg holds each of (k, 3) places, m in the odometry frame."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -22,8 +22,8 @@ class ChoiceConfig:
     """How far from its nominal place a foot may land, and what that costs."""
 
     radius: float = 0.075  # m, farthest
-    spread: float = 0.045  # m away that weigh as much as all of the quality
-    least_quality: float = 0.05  # worse places are none, 1
+    spread: float = 0.030  # m away that weigh as much as all of the quality
+    least_quality: float = 0.10  # worse places are none, 1
     keep: float = 0.25  # gain by which another place must be better than the one chosen before, 1
 
     def __post_init__(self) -> None:
@@ -54,14 +54,14 @@ class FootholdChoice:
 
 
 def choose(
-    ground: Ground, nominal: FloatArray, effort: Effort, last: FloatArray | None, config: ChoiceConfig
+    ground: Ground, nominal: FloatArray, reach: Reach, last: FloatArray | None, config: ChoiceConfig
 ) -> FootholdChoice:
     """The nearest good place, distance weighed against quality.
 
     Args:
         ground: rated map.
         nominal: (2,) m in the odometry frame, where the foot would land on level ground.
-        effort: of the leg, in units of the quality.
+        reach: what the leg holds.
         last: (2,) m, the place chosen before for the same landing; None without.
         config: bounds and weights.
     """
@@ -88,10 +88,10 @@ def choose(
     i, j = np.nonzero(fit)
     spots = to_world(map, np.column_stack([at_x[0, j], at_y[i, 0]]))
     places = np.column_stack([spots, height[i, j] + map.pose[2]])
-    total = cost[i, j] + effort(places)
-    best = int(total.argmin())
-    if not math.isfinite(total[best]):
+    held = reach(places)
+    if not held.any():
         return _none("all good ground is out of the leg's reach")
+    best = int(np.where(held, cost[i, j], np.inf).argmin())
     return FootholdChoice(place=places[best], quality=float(quality[i[best], j[best]]))
 
 

@@ -17,8 +17,8 @@ class RatingConfig:
 
     least_confidence: float = 0.2  # below it a height is no better than unknown, 1
     edge: float = 0.008  # m by which heights of neighbouring cells differ where there is an edge
-    least_distance: float = 0.010  # m from an edge or from unknown ground; nearer no foot stands
-    distance: float = 0.045  # m from it; farther no place gets better
+    least_distance: float = 0.013  # m from an edge or from unknown ground; nearer no foot stands
+    distance: float = 0.036  # m from it; farther no place gets better
     slope: float = 0.5  # rise per metre, steepest place to stand on
 
     def __post_init__(self) -> None:
@@ -59,8 +59,10 @@ def rate_ground(map: HeightMap, config: RatingConfig | None = None) -> Ground:
     height, even = _bridged(map.height, known, config.edge)
     high = ndimage.maximum_filter(np.where(even, height, -np.inf), size=3)
     low = ndimage.minimum_filter(np.where(even, height, np.inf), size=3)
-    free = even & (high - low <= config.edge)
-    away = map.cell * (ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] - 0.5)
+    sure = ndimage.minimum_filter(even, size=3, mode="nearest")
+    free = sure & (high - low <= config.edge)
+    # The cells on both sides of an edge are not free: the edge lies a cell beyond the last free one's middle.
+    away = map.cell * (ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1] + 0.5)
     reach = config.distance - config.least_distance
     quality = np.clip((away - config.least_distance) / reach, 0.0, 1.0)
     slope = _slope(np.where(even, height, 0.0), even, map.cell)
