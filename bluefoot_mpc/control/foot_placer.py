@@ -107,7 +107,7 @@ class FootPlacer:
         """
         if ground is None:
             if self._active:
-                gait.forget_steps()
+                gait.forget_steps(self.level)
                 self.reset()
             return
         if not estimate.healthy:
@@ -205,7 +205,7 @@ class FootPlacer:
         gait.plan_step(leg, complex(goal[0], goal[1]) - bias, float(goal[2]), top)
 
     def _held(self, gait: Gait, leg: int, places: FloatArray, pose: VirtualPose) -> BoolArray:
-        """(k,) whether the leg holds (k, 3) places of the gait's world while the virtual robot is at `pose`."""
+        """(k,) whether the leg holds (k, 3) places of the gait's world with the virtual robot at `pose`."""
         local = (places[:, 0] + 1j * places[:, 1] - pose.centre) * cmath.rect(1.0, -pose.yaw)
         nominal = gait.state.feet[leg].nominal
         away = self._config.sway * nominal / abs(nominal)

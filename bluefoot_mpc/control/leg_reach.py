@@ -48,7 +48,7 @@ class LegReach:
 def _table(
     links: tuple[float, float, float, float], bounds: tuple[tuple[float, float], ...]
 ) -> tuple[FloatArray, float]:
-    """Least room to a limit, rad (-inf out of reach), outward by upward cells; and the lowest cell's height."""
+    """Least room to a limit, rad (-inf out of reach), outward by upward cells; height of the lowest."""
     length = sum(links)
     outward = (np.arange(math.ceil(length / _CELL)) + 0.5) * _CELL
     count = math.ceil(1.3 * length / _CELL)

@@ -73,7 +73,7 @@ def _cells(key: _Key) -> FloatArray:
     rows, columns = SHAPE
     size = sum(links[1:]) / CELLS
     reach = size * (np.arange(rows + 1) + _FROM_REACH * CELLS)
-    height = size * (np.arange(columns + 1) + _FROM_HEIGHT * CELLS)
+    height: FloatArray = np.asarray(size * (np.arange(columns + 1) + _FROM_HEIGHT * CELLS), dtype=np.float64)
     nodes = np.stack([_row(r, height, links, bounds, (direction, room)) for r in reach.tolist()])
     corner = nodes[:-1, :-1]
     outward, upward = nodes[1:, :-1] - corner, nodes[:-1, 1:] - corner

@@ -158,9 +158,12 @@ class Gait:
         foot.goal, foot.goal_z, foot.top = place, height, max(top, height, foot.z)
         return True
 
-    def forget_steps(self) -> None:
-        """Take back what standing feet were told."""
+    def forget_steps(self, level: float) -> None:
+        """Take back what standing feet were told, and count all heights from another level, m."""
         for foot in self.state.feet:
+            foot.z, foot.start_z, foot.goal_z = foot.z - level, foot.start_z - level, foot.goal_z - level
+            if foot.top is not None:
+                foot.top -= level
             if not foot.swinging:
                 foot.goal = foot.top = None
 

@@ -56,7 +56,8 @@ class PreviewProblem:
         self._feet, self._stance = np.zeros((n, 4, 2)), np.zeros((n, 4))
         self._gravity = np.zeros(2)
         self._heading, self._reach = np.zeros((n, 2)), np.zeros((n, 2))
-        self._choices = choices = np.array([support.margin, support.half_width, config.depth, config.centre_pull])
+        choices = np.array([support.margin, support.half_width, config.depth, config.centre_pull])
+        self._choices = choices
         at_zmp, at_com = self.normals[: 4 * n], self.normals[4 * n : 8 * n]
         of_zmp, of_com = self._offsets[:n], self._offsets[n:]
         self._rows = Bound(
