@@ -96,8 +96,12 @@ def test_what_the_leg_does_not_hold_is_not_chosen():
 def test_a_choice_stays_while_another_is_hardly_better():
     ground = rate_ground(ground_map(np.zeros((60, 60))))
     last = np.array([0.015, 0.005])
-    assert choose(ground, np.array([0.006, 0.005]), easy, last, ChoiceConfig()).place[:2] == pytest.approx(last)
-    assert choose(ground, np.array([0.006, 0.005]), easy, None, ChoiceConfig()).place[0] == pytest.approx(0.005)
+    assert choose(ground, np.array([0.006, 0.005]), easy, last, ChoiceConfig()).place[:2] == pytest.approx(
+        last
+    )
+    assert choose(ground, np.array([0.006, 0.005]), easy, None, ChoiceConfig()).place[0] == pytest.approx(
+        0.005
+    )
 
 
 def test_a_swing_clears_the_highest_between():
