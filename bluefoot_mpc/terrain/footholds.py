@@ -22,7 +22,7 @@ class ChoiceConfig:
     """How far from its nominal place a foot may land, and what that costs."""
 
     radius: float = 0.075  # m, farthest
-    spread: float = 0.030  # m away that weigh as much as all of the quality
+    spread: float = 0.040  # m away that weigh as much as all of the quality
     least_quality: float = 0.10  # worse places are none, 1
     keep: float = 0.25  # gain by which another place must be better than the one chosen before, 1
 

@@ -18,7 +18,7 @@ class RatingConfig:
     least_confidence: float = 0.2  # below it a height is no better than unknown, 1
     edge: float = 0.008  # m by which heights of neighbouring cells differ where there is an edge
     least_distance: float = 0.013  # m from an edge or from unknown ground; nearer no foot stands
-    distance: float = 0.036  # m from it; farther no place gets better
+    distance: float = 0.050  # m from it; farther no place gets better
     slope: float = 0.5  # rise per metre, steepest place to stand on
 
     def __post_init__(self) -> None:

@@ -109,7 +109,7 @@ def test_legs_hold_their_stance_but_not_what_is_far(geometry):
     reach = LegReach(geometry)
     stance = FEET[:1] - (0.0, 0.0, HEIGHT)
     assert reach.holds(0, stance, 0.1).all()
-    assert not reach.holds(0, stance + (0.2, 0.0, 0.0), 0.1).any()
+    assert not reach.holds(0, stance - (-0.2, 0.0, 0.0), 0.1).any()
     assert not reach.holds(0, stance - (0.0, 0.0, 0.2), 0.1).any()
 
 
