@@ -37,6 +37,7 @@ class PlacerConfig:
     touch: TouchConfig = field(default_factory=TouchConfig)
     room: float = 0.07  # rad that legs keep to their limits where they land and lift
     sway: float = 0.020  # m that the trunk may be farther from a foot that lands or lifts
+    inward: float = 0.040  # m inward of its place beside the trunk that a foot may stand
     clearance: float = 0.015  # m above all that a swing passes over
     least_lift: float = 0.020  # m above where a foot stands, and where it lands
     width: float = 0.036  # m, of the way that a swing must clear
@@ -52,7 +53,7 @@ class PlacerConfig:
     def __post_init__(self) -> None:
         """Check ranges."""
         require_nonnegative(
-            room=self.room, sway=self.sway, clearance=self.clearance, least_lift=self.least_lift,
+            room=self.room, sway=self.sway, inward=self.inward, clearance=self.clearance, least_lift=self.least_lift,
             width=self.width, decided=self.decided, slow=self.slow,
         )  # fmt: skip
         require_positive(follow=self.follow, level_time=self.level_time, stop=self.stop)
@@ -207,12 +208,16 @@ class FootPlacer:
     def _held(self, gait: Gait, leg: int, places: FloatArray, pose: VirtualPose) -> BoolArray:
         """(k,) whether the leg holds (k, 3) places of the gait's world with the virtual robot at `pose`."""
         local = (places[:, 0] + 1j * places[:, 1] - pose.centre) * cmath.rect(1.0, -pose.yaw)
-        nominal = gait.state.feet[leg].nominal
-        away = self._config.sway * nominal / abs(nominal)
-        style = gait.state.style
-        x, y = local.real + away.real - style.trunk_forward, local.imag + away.imag
+        nominal, style = gait.state.feet[leg].nominal, gait.state.style
+        # A foot far inward makes the support of its neighbours' steps thin.
+        held = local.imag * math.copysign(1.0, nominal.imag) >= abs(nominal.imag) - self._config.inward
+        sway = self._config.sway * nominal / abs(nominal)
         z = places[:, 2] - self.level - style.trunk_height
-        return self._reach.holds(leg, np.column_stack([x, y, z]), self._config.room)
+        # Near its hip a leg is folded as far as it goes, so both ways count.
+        for aside in (sway, -sway):
+            away = local - style.trunk_forward + aside
+            held &= self._reach.holds(leg, np.column_stack([away.real, away.imag, z]), self._config.room)
+        return np.asarray(held)
 
     def _follow_feet(self, gait: Gait, dt: float) -> None:
         """Height of the trunk's plane, and how fast the walk may go on."""

@@ -6,7 +6,7 @@ from bluefoot_mpc.evaluation.cases import Case
 from bluefoot_mpc.evaluation.limits import Limit
 
 SEEDS = tuple(range(20))
-DURATION = 170.0
+DURATION = 140.0
 """s for 1.5 m with all sweeps."""
 BLIND_DURATION = 62.0
 """s for 1.5 m at 30 mm/s without any."""

@@ -23,8 +23,8 @@ GOAL_TOLERANCE = 0.05
 class RoughConfig(ScenarioConfig):
     """Crossing rough ground."""
 
-    duration: float = 170.0  # s
-    speed: float = 0.02  # m/s, at most
+    duration: float = 140.0  # s
+    speed: float = 0.022  # m/s, at most
     goal: float = 1.5  # m ahead of the start, where the goal line lies
     stand_time: float = 1.5  # s before the first step
     blind: bool = False  # walk straight on at one step height, without looking

@@ -27,14 +27,17 @@ _PLAN = PlanConfig(
     treads=TreadConfig(reach=0.065, least_quality=0.05),
 )
 """A way as straight as feet can be placed along it: a crawl follows no wiggles."""
-_SWEEP = SweepConfig(dwell_scans=2, pitch_max_deg=34.0)
-"""Twice as many points; and so far down that what is seen begins within the ground taken to be even."""
+_FIRST_SWEEP = SweepConfig(dwell_scans=2, pitch_max_deg=34.0)
+"""So far down that what is seen begins within the ground that is taken to be even."""
+_SWEEP = SweepConfig(dwell_scans=2, pitch_max_deg=26.0)
+"""What is nearer an earlier sweep has seen, and on rough ground the nose must not go so low."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class CrossingConfig:
     """Configuration of each part, and of what ties them together."""
 
+    first_sweep: SweepConfig = field(default_factory=lambda: _FIRST_SWEEP)
     sweep: SweepConfig = field(default_factory=lambda: _SWEEP)
     cloud: CloudConfig = field(default_factory=CloudConfig)
     map: MapConfig = field(default_factory=MapConfig)

@@ -84,7 +84,9 @@ class Crosser:
 
     def __init__(self, config: CrossingConfig, robot: RobotParameters) -> None:
         self._config = config
-        self._sweeper = Sweeper(config.sweep, robot.sensors, config.cloud, LegGeometry.from_parameters(robot))
+        legs = LegGeometry.from_parameters(robot)
+        self._first_sweeper = Sweeper(config.first_sweep, robot.sensors, config.cloud, legs)
+        self._later_sweeper = Sweeper(config.sweep, robot.sensors, config.cloud, legs)
         self._mapper = Mapper(config, robot)
         self._thinker: Thinker[Thought] = Thinker(config.think_ticks)
         self._centre = FeetCentre(config.follower.smoothing)
@@ -98,6 +100,7 @@ class Crosser:
 
     def begin(self) -> None:
         """Forget the task, not the ground: what comes next is a new one."""
+        self._sweeper = self._first_sweeper
         self._sweeper.reset()
         self._thinker.reset()
         self._centre.reset()
@@ -147,6 +150,7 @@ class Crosser:
         if self._stood >= self._config.settle_time:
             self._mapper.stand_on(places, estimate.time)
             self._mapper.begin_sweep()
+            self._sweeper = self._later_sweeper if self._sweeps else self._first_sweeper
             self._sweeper.begin(estimate.time)
             self._stage = _Stage.LOOK
         return self._stand(CrossingPhase.SWEEP)

@@ -73,7 +73,7 @@ def test_a_sweep_that_saw_nothing_leaves_it_where_it_is(monkeypatch):
 
 
 def test_a_foot_without_a_foothold_makes_it_look_again_and_then_stay(monkeypatch):
-    bench = Bench(monkeypatch)
+    bench = Bench(monkeypatch, patience=2.0)
     last = bench.run(60.0, speed=0.005, waiting="FL: nothing to step on")
     assert last.phase is CrossingPhase.BLOCKED
     assert last.reason == "FL: nothing to step on"
