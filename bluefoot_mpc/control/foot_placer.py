@@ -53,8 +53,8 @@ class PlacerConfig:
     def __post_init__(self) -> None:
         """Check ranges."""
         require_nonnegative(
-            room=self.room, sway=self.sway, inward=self.inward, clearance=self.clearance, least_lift=self.least_lift,
-            width=self.width, decided=self.decided, slow=self.slow,
+            room=self.room, sway=self.sway, inward=self.inward, clearance=self.clearance,
+            least_lift=self.least_lift, width=self.width, decided=self.decided, slow=self.slow,
         )  # fmt: skip
         require_positive(follow=self.follow, level_time=self.level_time, stop=self.stop)
 

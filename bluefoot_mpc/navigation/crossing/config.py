@@ -19,7 +19,6 @@ from bluefoot_mpc.terrain.registration import Bounds
 from bluefoot_mpc.terrain.sweep import SweepConfig
 from bluefoot_mpc.terrain.treads import TreadConfig
 
-
 _PLAN = PlanConfig(
     even_radius=0.0,
     k_side=5.0,

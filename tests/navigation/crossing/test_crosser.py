@@ -6,7 +6,6 @@ import pytest
 from bluefoot_mpc.types import CrossingPhase, GuideTask
 from tests.navigation.crossing.bench import Bench
 
-
 REACH = 0.08
 """m by which feet may land short of their places under the trunk, and the bench's robot overshoots."""
 
