@@ -115,6 +115,7 @@ class Crosser:
         self._stood = self._waited = self._since_thought = 0.0
         self._reason = ""
         self._arrived = False
+        self._named: tuple[float, ...] | None = None
 
     def step(
         self, guide: Guide, frame: SensorFrame, estimate: BodyState, feet: FeetState, dt: float
@@ -128,7 +129,10 @@ class Crosser:
             feet: how the feet fared on the last tick.
             dt: s.
         """
+        self._begin_where_the_goal_is_new(guide)
         places = foot_places(estimate)
+        if not np.isfinite(places).all():
+            return self._stand(CrossingPhase.BLOCKED, reason="the estimate of the robot's pose is no number")
         self._place = self._centre.step(places, dt)
         if self._origin is None:
             self._origin = self._place
@@ -141,6 +145,13 @@ class Crosser:
         if self._stage is _Stage.WALK:
             return self._walk(guide, frame, estimate, feet, dt)
         return self._stand(CrossingPhase.ARRIVED if self._arrived else CrossingPhase.BLOCKED)
+
+    def _begin_where_the_goal_is_new(self, guide: Guide) -> None:
+        """Another goal is another task: whoever has arrived, or was blocked, sets out again."""
+        named = tuple(guide.waypoints[-1].tolist()) if len(guide.waypoints) else ()
+        if self._named is not None and named != self._named:
+            self.begin()
+        self._named = named
 
     def _settle(
         self, feet: FeetState, places: FloatArray, estimate: BodyState, dt: float
@@ -171,6 +182,8 @@ class Crosser:
         """Stand until the way is planned."""
         thought = self._thinker.step()
         if thought is None:
+            if self._thinker.failure:
+                self._look_again(self._why_no_thought())
             return self._stand(CrossingPhase.THINK)
         self._take(thought)
         if guide.task is GuideTask.SWEEP:
@@ -201,6 +214,8 @@ class Crosser:
             self._look_again(self._reason)
         elif self._waited > self._config.patience:
             self._look_again(feet.waiting)
+        elif self._thinker.failure:
+            self._look_again(self._why_no_thought())
         report = self._report(CrossingPhase.WALK, points=points, thought=thought)
         trunk = self._mapper.trunk_on_the_way(estimate.time)
         report = replace(report, speed=float(np.hypot(*steering.velocity)), pitch=float(trunk.rpy[1]))
@@ -223,6 +238,9 @@ class Crosser:
             self._since_thought = 0.0
             self._thinker.start(self._mapper.thinking(self._pose(estimate), goal))
         return thought, points
+
+    def _why_no_thought(self) -> str:
+        return f"mapping and planning failed: {self._thinker.failure}"
 
     def _take(self, thought: Thought) -> None:
         self._thought, self.ground = thought, thought.ground
@@ -252,7 +270,7 @@ class Crosser:
             self._stage = _Stage.STAY
 
     def _goal(self, guide: Guide) -> FloatArray:
-        """(2,) m, where to in the odometry frame; ahead where none was named."""
+        """(2,) m, where to in the odometry frame; where the robot is already where none was named."""
         if len(guide.waypoints):
             return np.asarray(guide.waypoints[-1], dtype=np.float64)
         return self._place
@@ -271,11 +289,11 @@ class Crosser:
 
     def _stand(
         self, phase: CrossingPhase, *, trunk: TrunkPose | None = None, points: FloatArray = _NOTHING,
-        level: int = -1, thought: Thought | None = None,
+        level: int = -1, thought: Thought | None = None, reason: str = "",
     ) -> CrossingDecision:  # fmt: skip
         trunk = trunk or TrunkPose()
         report = replace(self._report(phase, points=points, thought=thought), level=level)
-        report = replace(report, pitch=float(trunk.rpy[1]))
+        report = replace(report, pitch=float(trunk.rpy[1]), reason=reason or report.reason)
         return CrossingDecision(velocity=_STILL, yaw_rate=0.0, trunk=trunk, report=report)
 
     def _report(self, phase: CrossingPhase, *, points: FloatArray, thought: Thought | None) -> CrossingReport:

@@ -13,7 +13,7 @@ from bluefoot_mpc.navigation.crossing.config import CrossingConfig
 from bluefoot_mpc.navigation.crossing.pace import paces
 from bluefoot_mpc.navigation.crossing.pose_track import PoseTrack
 from bluefoot_mpc.terrain.cloud import lidar_place, scan_points
-from bluefoot_mpc.terrain.frame import centres
+from bluefoot_mpc.terrain.frame import centres, heights_at
 from bluefoot_mpc.terrain.free_space import carved
 from bluefoot_mpc.terrain.ground import Ground, rate_ground
 from bluefoot_mpc.terrain.height_map import MapBuilder, Region
@@ -21,6 +21,11 @@ from bluefoot_mpc.terrain.merge import Walked, merge
 from bluefoot_mpc.terrain.plan import Route, plan_route
 from bluefoot_mpc.terrain.registration import align, moved
 from bluefoot_mpc.types import BodyState, FloatArray, HeightMap, SensorFrame, TrunkPose
+
+FIT = 0.02
+"""m, by which a map may differ from where a foot stands: its errors, and those of the odometry since."""
+_MOST_FEET = 3
+"""Feet that must fit: one may stand on an edge."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -62,19 +67,23 @@ class Mapper:
         self._stands = False
 
     def forget_start(self) -> None:
-        """The robot may have been put elsewhere: what it stands on next is even ground again."""
+        """The robot may have been put elsewhere: the map must prove itself where it stands next."""
         self._stands = False
 
     def stand_on(self, feet: FloatArray, time: float) -> None:
         """Take the ground around standing feet to be even, the first time.
 
+        Not where a map from before fits the feet: the robot may stand amid rough ground. A map that does
+        not fit is of some other place, and is forgotten.
+
         Args:
             feet: (4, 3) m, foot points in the odometry frame.
             time: s.
         """
-        if not self._stands and self._config.start_radius > 0.0:
-            under = feet - (0.0, 0.0, self._foot_radius)
-            self._known = merge(self._known, even_ground(under, time, self._config))
+        under = feet - (0.0, 0.0, self._foot_radius)
+        if not self._stands and not _fits(self._known, under):
+            radius = self._config.start_radius
+            self._known = merge(None, even_ground(under, time, self._config)) if radius > 0.0 else None
         self._stands = True
 
     def begin_sweep(self) -> None:
@@ -199,6 +208,19 @@ def think(
     route = shortened(route, config.stretch)
     pace = paces(ground.map, route.poses, config.pace) if len(route.poses) else np.zeros(0)
     return Thought(ground=ground, route=route, pace=pace, drift=drift)
+
+
+def _fits(known: HeightMap | None, under: FloatArray) -> bool:
+    """True where most feet stand on known ground of a map, and at its heights.
+
+    Args:
+        known: the map; None without one.
+        under: (4, 3) m, ground under the feet, odometry frame.
+    """
+    if known is None:
+        return False
+    off = np.abs(heights_at(known, under[:, :2]) - under[:, 2])
+    return int(np.count_nonzero(off <= FIT)) >= _MOST_FEET
 
 
 def region_around(pose: FloatArray, config: CrossingConfig) -> Region:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
 T = TypeVar("T")
+log = logging.getLogger(__name__)
 
 
 class Thinker(Generic[T]):
@@ -15,6 +17,9 @@ class Thinker(Generic[T]):
     Never sooner, so that a run and its replay see the same result on the same
     tick, however fast the machine; if the work is not done by then the tick
     waits for it, and counts as late.
+
+    Attributes:
+        failure: why the last work gave no result, from its tick until the next begins; else empty.
 
     Args:
         ticks: after which the result is handed over.
@@ -29,6 +34,7 @@ class Thinker(Generic[T]):
         """Forget the work; what still runs ends unheard."""
         self._thread = None
         self._left = 0
+        self.failure = ""
         self._result: list[T] = []
         self._failure: list[Exception] = []
 
@@ -49,7 +55,7 @@ class Thinker(Generic[T]):
         def run() -> None:
             try:
                 result.append(work())
-            except Exception as error:  # it is raised again on the tick that waits for the result
+            except Exception as error:  # the ticks must go on; the one that waits for the result tells
                 failure.append(error)
 
         self._left = self._ticks
@@ -57,7 +63,7 @@ class Thinker(Generic[T]):
         self._thread.start()
 
     def step(self) -> T | None:
-        """One tick: the result on the last of them, else None."""
+        """One tick: the result on the last of them, else None; None as well where there is a `failure`."""
         thread = self._thread
         if thread is None:
             return None
@@ -68,5 +74,7 @@ class Thinker(Generic[T]):
         result, failure = self._result, self._failure
         self.reset()
         if failure:
-            raise failure[0]
+            log.error("thinking failed", exc_info=failure[0])
+            self.failure = f"{type(failure[0]).__name__}: {failure[0]}"
+            return None
         return result[0]

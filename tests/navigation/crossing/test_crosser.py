@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from bluefoot_mpc.types import CrossingPhase, GuideTask
-from tests.navigation.crossing.bench import Bench
+from bluefoot_mpc.navigation.crossing import mapper
+from bluefoot_mpc.navigation.crossing.crosser import FeetState
+from bluefoot_mpc.types import CrossingPhase, Guide, GuideTask
+from tests.navigation.crossing.bench import DT, Bench, estimate, frame
 
 REACH = 0.08
 """m by which feet may land short of their places under the trunk, and the bench's robot overshoots."""
@@ -97,3 +99,46 @@ def test_a_new_task_begins_anew_and_a_reset_forgets_the_ground(monkeypatch):
     assert bench.pose[0] == pytest.approx(3.0, abs=0.05)
     bench.crosser.reset()
     assert bench.crosser.ground is None
+
+
+def test_another_goal_is_walked_to_although_it_has_arrived(monkeypatch):
+    bench = Bench(monkeypatch)
+    assert bench.run(25.0, goal=(0.5, 0.0)).phase is CrossingPhase.ARRIVED
+    assert bench.run(0.1, goal=(1.0, 0.0)).phase is CrossingPhase.SWEEP
+    assert bench.run(25.0, goal=(1.0, 0.0)).phase is CrossingPhase.ARRIVED
+    assert bench.pose[0] == pytest.approx(1.0, abs=0.05)
+
+
+def test_what_goes_wrong_in_thinking_is_a_reason_to_stay(monkeypatch):
+    def broken(*_):
+        raise ValueError("no such ground")
+
+    monkeypatch.setattr(mapper, "rate_ground", broken)
+    bench = Bench(monkeypatch)
+    last = bench.run(10.0)
+    assert last.phase is CrossingPhase.BLOCKED
+    assert "no such ground" in last.reason
+    assert last.sweeps == 3
+    assert not bench.pose.any()
+
+
+def test_a_task_that_begins_amid_a_map_does_not_take_the_ground_to_be_even(monkeypatch):
+    bench = Bench(monkeypatch, world=lambda x, y: np.where((x > 0.75) & (x < 0.95), np.nan, 0.0))
+    last = bench.run(70.0)
+    assert last.phase is CrossingPhase.BLOCKED
+    stands = bench.pose[0]
+    bench.crosser.begin()
+    assert bench.run(70.0).phase is CrossingPhase.BLOCKED
+    assert bench.pose[0] < stands + 0.03
+
+
+def test_an_estimate_that_is_no_number_moves_nothing_and_is_forgotten(monkeypatch):
+    bench = Bench(monkeypatch)
+    bench.run(5.0)
+    pose, bench.pose = bench.pose, np.full(3, np.nan)
+    guide = Guide(task=GuideTask.CROSS, waypoints=np.array([[1.5, 0.0]]))
+    found = bench.crosser.step(guide, frame(5.0), estimate(5.0, bench.pose), FeetState(resting=True), DT)
+    assert not found.velocity.any()
+    assert "no number" in found.report.reason
+    bench.pose = pose
+    assert bench.run(40.0).phase is CrossingPhase.ARRIVED
