@@ -10,7 +10,7 @@ import numpy as np
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.geometry import rotation_from_quaternion
 from bluefoot_mpc.model.parameters import SensorMounts
-from bluefoot_mpc.settings import require_nonnegative, require_positive
+from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
 from bluefoot_mpc.types import FloatArray, LidarScan
 
 
@@ -26,8 +26,9 @@ class CloudConfig:
 
     def __post_init__(self) -> None:
         require_nonnegative(
-            least_range=self.least_range, own_radius=self.own_radius, smooth=self.smooth, same=self.same
+            least_range=self.least_range, own_radius=self.own_radius, same=self.same
         )  # fmt: skip
+        require_range(0, 50, smooth=self.smooth)
         require_positive(greatest_range=self.greatest_range)
         if self.greatest_range <= max(self.least_range, self.own_radius):
             raise ConfigurationError(

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bluefoot_mpc.settings import require_nonnegative, require_positive
+from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
 from bluefoot_mpc.terrain.frame import cells_of
 from bluefoot_mpc.types import FloatArray, HeightMap
 
@@ -28,7 +28,9 @@ class FreeSpaceConfig:
 
     def __post_init__(self) -> None:
         require_nonnegative(start=self.start, margin=self.margin)
-        require_positive(reach=self.reach, step=self.step, rays=self.rays)
+        require_positive(rays=self.rays)
+        require_range(0.01, 1.0, reach=self.reach)
+        require_range(0.002, 1.0, step=self.step)
 
 
 def carved(ground: HeightMap, points: FloatArray, origins: FloatArray, config: FreeSpaceConfig) -> HeightMap:

@@ -15,7 +15,7 @@ from bluefoot_mpc.terrain.cells import CellConfig, cell_heights
 from bluefoot_mpc.terrain.filters import close_gaps, dilate, median, neighbours, slopes
 from bluefoot_mpc.types import BoolArray, FloatArray, HeightMap
 
-_LARGEST = 1_000_000
+LARGEST = 1_000_000
 """Cells of a map, at most: a slip in a configuration must not take all memory."""
 
 
@@ -35,8 +35,11 @@ class MapConfig:
     capacity: int = 200_000  # points that are kept, the newest
 
     def __post_init__(self) -> None:
-        require_positive(cell=self.cell, gap_step=self.gap_step, capacity=self.capacity)
+        require_positive(cell=self.cell, gap_step=self.gap_step)
         require_nonnegative(dilation=self.dilation, gap=self.gap, spike=self.spike)
+        require_range(0.005, 0.5, cell=self.cell)
+        require_range(0, 10, dilation=self.dilation, gap=self.gap)
+        require_range(1, 10_000_000, capacity=self.capacity)
         require_range(0.0, 1.0, gap_confidence=self.gap_confidence, gap_trust=self.gap_trust)
         require_range(1, 15, median=self.median)
         if self.median % 2 == 0:
@@ -61,8 +64,8 @@ class Region:
         if self.pose.shape != (4,):
             raise ConfigurationError(f"a region's pose is x, y, z, yaw, not of shape {self.pose.shape}")
         require_finite(pose=tuple(self.pose.tolist()))
-        if not (self.n >= 1 and self.m >= 1 and self.n * self.m <= _LARGEST):
-            raise ConfigurationError(f"a region of {self.n} x {self.m} cells must have 1 to {_LARGEST} cells")
+        if not (self.n >= 1 and self.m >= 1 and self.n * self.m <= LARGEST):
+            raise ConfigurationError(f"a region of {self.n} x {self.m} cells must have 1 to {LARGEST} cells")
 
     @classmethod
     def spanning(cls, x: tuple[float, float], y: tuple[float, float], cell: float) -> Self:

@@ -37,8 +37,12 @@ class PlanConfig:
         if self.planner not in PLANNERS:
             raise UnknownNameError("planner", self.planner, PLANNERS)
         require_range(1, 200, window=self.window)
-        require_positive(cell=self.cell, horizon=self.horizon, max_under=self.max_under)
+        require_positive(max_under=self.max_under)
         require_nonnegative(
-            side=self.side, even_radius=self.even_radius, k_side=self.k_side, goal_width=self.goal_width,
-            under_radius=self.under_radius, least_advance=self.least_advance,
+            even_radius=self.even_radius, k_side=self.k_side, goal_width=self.goal_width,
+            least_advance=self.least_advance,
         )  # fmt: skip
+        require_range(0.01, 0.5, cell=self.cell)
+        require_range(self.cell, 10.0, horizon=self.horizon)
+        require_range(0.0, 2.0, side=self.side)
+        require_range(0.0, 0.5, under_radius=self.under_radius)

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.geometry import wrap_angle
-from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
+from bluefoot_mpc.settings import require_positive, require_range
 from bluefoot_mpc.terrain.filters import slopes
 from bluefoot_mpc.terrain.frame import bilinear, centres, to_map
 from bluefoot_mpc.types import FloatArray, HeightMap
@@ -22,6 +23,8 @@ _PARAMETERS = 6
 """x, y, yaw, z and the two slopes of a tilt."""
 _EVERY = 3
 """One cell in so many is looked at on the coarse grid."""
+_MOST_TRIES = 20_000
+"""On the coarse grid: more take longer than the robot should stand and think."""
 _CORRELATED = 4.0
 """Cells that share their noise: edges cross several, and both maps cut them into the same squares."""
 
@@ -48,8 +51,14 @@ class Bounds:
             overlap=self.overlap, misfit=self.misfit, sure=self.sure, sure_deg=self.sure_deg, step=self.step,
             step_deg=self.step_deg,
         )  # fmt: skip
-        require_nonnegative(iterations=self.iterations)
+        require_range(0, 100, iterations=self.iterations)
         require_range(0.0, 30.0, turn_deg=self.turn_deg)
+        tries = (2.0 * self.shift / self.step + 1.0) ** 2 * (2.0 * self.turn_deg / self.step_deg + 1.0)
+        if tries > _MOST_TRIES:
+            raise ConfigurationError(
+                f"steps of {self.step:g} m and {self.step_deg:g} degrees within {self.shift:g} m and "
+                f"{self.turn_deg:g} degrees are {tries:.3g} tries: make them {_MOST_TRIES} or fewer"
+            )
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -37,9 +37,8 @@ class TreadConfig:
 
     def __post_init__(self) -> None:
         require_positive(max_step=self.max_step)
-        require_nonnegative(
-            reach=self.reach, clear=self.clear, off_place=self.off_place, k_quality=self.k_quality
-        )
+        require_nonnegative(off_place=self.off_place, k_quality=self.k_quality)
+        require_range(0.0, 0.2, reach=self.reach, clear=self.clear)
         require_range(0.0, 1.0, least_quality=self.least_quality)
         require_range(0.0, 89.0, max_slope_deg=self.max_slope_deg)
 

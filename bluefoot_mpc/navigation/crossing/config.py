@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.navigation.crossing.follower import FollowerConfig
 from bluefoot_mpc.navigation.crossing.pace import PaceConfig
 from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
@@ -12,7 +13,7 @@ from bluefoot_mpc.terrain.cloud import CloudConfig
 from bluefoot_mpc.terrain.cost import CostConfig
 from bluefoot_mpc.terrain.free_space import FreeSpaceConfig
 from bluefoot_mpc.terrain.ground import RatingConfig
-from bluefoot_mpc.terrain.height_map import MapConfig
+from bluefoot_mpc.terrain.height_map import LARGEST, MapConfig
 from bluefoot_mpc.terrain.merge import MergeConfig
 from bluefoot_mpc.terrain.plan import PlanConfig
 from bluefoot_mpc.terrain.registration import Bounds
@@ -66,14 +67,27 @@ class CrossingConfig:
 
     def __post_init__(self) -> None:
         require_nonnegative(
-            start_radius=self.start_radius, settle_time=self.settle_time, patience=self.patience,
+            settle_time=self.settle_time, patience=self.patience,
             progress=self.progress, walking_swing_deg=self.walking_swing_deg,
         )  # fmt: skip
+        require_range(0.0, 2.0, start_radius=self.start_radius)
+        require_range(0.2, 5.0, ahead=self.ahead, behind=self.behind, aside=self.aside)
+        self._require_a_map_of_some_size()
         require_positive(
-            ahead=self.ahead, behind=self.behind, aside=self.aside, stretch=self.stretch,
-            rethink_time=self.rethink_time, walking_period=self.walking_period,
+            stretch=self.stretch, rethink_time=self.rethink_time, walking_period=self.walking_period,
         )  # fmt: skip
         require_range(0.0, 1.0, start_confidence=self.start_confidence)
         require_range(0.0, 31.0, walking_pitch_deg=self.walking_pitch_deg)
         require_range(1, 500, think_ticks=self.think_ticks)
         require_range(1, 100, attempts=self.attempts)
+
+    def _require_a_map_of_some_size(self) -> None:
+        """What a map may have at most must not come up only when the robot stands in it."""
+        across = 2.0 * max(math.hypot(max(self.ahead, self.behind), self.aside), self.start_radius)
+        cells = (across / self.map.cell + 2.0) ** 2
+        if cells > LARGEST:
+            raise ConfigurationError(
+                f"a map with cells of {self.map.cell:g} m as far as ahead = {self.ahead:g}, behind = "
+                f"{self.behind:g} and aside = {self.aside:g} m may have {cells:.3g} cells, and {LARGEST} at "
+                "most: make the cells larger, or the map smaller"
+            )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
+from bluefoot_mpc.settings import require_nonnegative, require_range
 from bluefoot_mpc.terrain.frame import heights_at
 from bluefoot_mpc.types import FloatArray, HeightMap
 
@@ -23,7 +23,7 @@ class PaceConfig:
 
     def __post_init__(self) -> None:
         require_nonnegative(even=self.even)
-        require_positive(half_side=self.half_side, spacing=self.spacing)
+        require_range(0.01, 1.0, half_side=self.half_side, spacing=self.spacing)
         require_range(self.even + 1e-6, 1.0, rough=self.rough)
         require_range(0.05, 1.0, least=self.least)
 
