@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.exceptions import ConfigurationError, UnknownNameError
 from bluefoot_mpc.runtime.data import RunData
 from bluefoot_mpc.scenarios.base import Criterion, Scenario, ScenarioConfig, not_fallen
 from bluefoot_mpc.scenarios.crossing_figures import crossing_figures
+from bluefoot_mpc.scenarios.options import GAITS
 from bluefoot_mpc.settings import require_nonnegative, require_range
 from bluefoot_mpc.types import Guide, GuideTask, Mode, MotionCommand
 
@@ -38,6 +39,13 @@ class RoughConfig(ScenarioConfig):
         require_range(0.1, 20.0, goal=self.goal)
         require_range(0.005, 0.08, step_height=self.step_height)
         require_nonnegative(stand_time=self.stand_time)
+        if self.gait not in GAITS:
+            raise UnknownNameError("gait", self.gait, GAITS)
+        if self.gait != "walk" and not self.blind:
+            raise ConfigurationError(
+                f"gait = '{self.gait}' is for a blind walk: footholds are chosen for the gait 'walk' only; "
+                "leave it out, or add --blind"
+            )
         if self.blind and self.incremental:
             raise ConfigurationError("blind and incremental exclude one another: leave one of them out")
 

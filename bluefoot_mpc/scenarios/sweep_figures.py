@@ -78,13 +78,13 @@ def covered(ground: HeightMap, estimate: BodyState, nearest: float) -> float | N
 
 
 def nearest_line(run: RunData, height: float) -> float:
-    """How far (m) ahead of the trunk the steepest level of a run's sweep meets level ground.
+    """How far (m) ahead of the trunk the steepest level of a run's first sweep meets level ground.
 
     Args:
         run: the run.
         height: m, of the trunk over the feet.
     """
-    sweep = build(SweepConfig, run.config["control"]["crossing"]["sweep"])
+    sweep = build(SweepConfig, run.config["control"]["crossing"]["first_sweep"])
     lift = build(RobotParameters, run.config["model"]).sensors.lidar[2]
     return float(line_ahead(sweep.pitch_range[1], height, lift))
 

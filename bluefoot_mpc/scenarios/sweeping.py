@@ -18,7 +18,7 @@ MAX_MEDIAN, MAX_95 = 5.0, 15.0
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SweepScenarioConfig(ScenarioConfig):
-    """One sweep; its range and levels are of the controller: ``control.crossing.sweep``."""
+    """One sweep; its range and levels are of the controller: ``control.crossing.first_sweep``."""
 
     duration: float = 18.0  # s
     stand_time: float = 1.5  # s before the sweep, in which the attitude settles

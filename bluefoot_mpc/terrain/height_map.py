@@ -37,7 +37,7 @@ class MapConfig:
     def __post_init__(self) -> None:
         require_positive(cell=self.cell, gap_step=self.gap_step)
         require_nonnegative(dilation=self.dilation, gap=self.gap, spike=self.spike)
-        require_range(0.005, 0.5, cell=self.cell)
+        require_range(0.005, 0.1, cell=self.cell)
         require_range(0, 10, dilation=self.dilation, gap=self.gap)
         require_range(1, 10_000_000, capacity=self.capacity)
         require_range(0.0, 1.0, gap_confidence=self.gap_confidence, gap_trust=self.gap_trust)

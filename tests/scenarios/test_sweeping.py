@@ -20,9 +20,9 @@ ASKEW = (0.7, 1.0, 0.0)
 def swept():
     overrides = (
         "scenario.duration=4.4", "scenario.stand_time=0.4", f"sim.lidar.mount_error_deg={list(ASKEW)}",
-        "control.crossing.sweep.pitch_max_deg=22", "control.crossing.sweep.ground_step=0.05",
-        "control.crossing.sweep.max_rate=1.0", "control.crossing.think_ticks=5",
-        "control.crossing.sweep.dwell_scans=1",
+        "control.crossing.first_sweep.pitch_max_deg=22", "control.crossing.first_sweep.ground_step=0.05",
+        "control.crossing.first_sweep.max_rate=1.0", "control.crossing.think_ticks=5",
+        "control.crossing.first_sweep.dwell_scans=1",
     )  # fmt: skip
     return simulate("sweep", RunOptions(world="flat", seed=1, controller="cpg", overrides=overrides))
 
