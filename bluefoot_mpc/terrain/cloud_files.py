@@ -23,6 +23,8 @@ _PLY_TYPES = {
 }  # fmt: skip
 _PCD_TYPES = {"F": "f", "I": "i", "U": "u"}
 _LONGEST_HEADER = 65536
+_MOST_NUMBERS = 1000
+"""Of a point; more are a damaged header."""
 
 
 class CloudFileError(BlueFootError):
@@ -158,6 +160,8 @@ def _pcd_layout(content: bytes) -> _Layout:
         raise ValueError(f"its data are '{form}': write them as 'binary' or 'ascii'")
     names = header["FIELDS"]
     counts = [int(count) for count in header.get("COUNT", ["1"] * len(names))]
+    if not 0 < sum(counts) <= _MOST_NUMBERS or min(counts) < 0:
+        raise ValueError(f"a point has {sum(counts)} numbers, by its line 'COUNT'")
     fields = []
     for k, (name, size, kind, count) in enumerate(
         zip(names, header["SIZE"], header["TYPE"], counts, strict=True)
@@ -201,8 +205,10 @@ def _records(content: bytes, layout: _Layout) -> np.ndarray[tuple[int], np.dtype
         return np.frombuffer(content, dtype=layout.record, count=layout.count, offset=layout.start)
     if layout.count == 0:
         return np.zeros(0, dtype=layout.record)
-    text = io.StringIO(content[layout.start :].decode("ascii"))
-    rows = np.loadtxt(text, dtype=np.float64, max_rows=layout.count, ndmin=2)
+    lines = content[layout.start :].decode("ascii").strip()
+    if layout.count > lines.count("\n") + 1 or not lines:
+        raise ValueError(f"{layout.count} points were announced, it has fewer lines: the file is cut short")
+    rows = np.loadtxt(io.StringIO(lines), dtype=np.float64, max_rows=layout.count, ndmin=2)
     names = layout.record.names or ()
     if rows.shape != (layout.count, len(names)):
         raise ValueError(f"{layout.count} points of {len(names)} numbers were announced, it has {rows.shape}")

@@ -56,7 +56,7 @@ class PlanningGrid:
         blind = self.unknown_feet((cell[0], cell[1] + 1, cell[2]))
         if blind:
             return f"the ground under {', '.join(blind)} ahead of that is unknown"
-        return "the ground ahead of that is too steep or too high to step on"
+        return "the ground ahead of that is too steep or too high to step on, or hardly known"
 
     def _foot_cells(self, cell: Start) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         yaw = yaw_of(cell[2], self.cost.shape[2])

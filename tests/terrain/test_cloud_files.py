@@ -93,6 +93,9 @@ def test_big_endian_ply_is_read(tmp_path: Path) -> None:
         ("a.pcd", PCD_TEXT.replace("ascii", "binary_compressed").encode(), "write them as 'binary'"),
         ("a.pcd", PCD_TEXT.replace("POINTS 2", "POINTS -1").encode(), "-1 points"),
         ("a.pcd", PCD_TEXT.replace("SIZE 4 4 4 4 1", "SIZE 4 4").encode(), "PCD"),
+        ("a.pcd", PCD_TEXT.replace("POINTS 2", "POINTS 999999999999").encode(), "cut short"),
+        ("a.pcd", PCD_TEXT.replace("COUNT 1", "COUNT 99999999").encode(), "COUNT"),
+        ("a.ply", PLY_TEXT[: PLY_TEXT.index("end_header") + 11].encode(), "cut short"),
         ("a.pcd", PCD_TEXT.replace("SIZE 4 4 4 4", "SIZE 4 4 4 3").encode(), "f3|understood"),
     ],
 )
