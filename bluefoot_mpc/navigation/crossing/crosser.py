@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -29,6 +30,8 @@ from bluefoot_mpc.types import (
 
 _STILL = np.zeros(2)
 _NOTHING = np.zeros((0, 3))
+_PAUSE = 0.3
+"""s without a tick, after which a sweep begins anew: the robot was told to do something else."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -115,6 +118,7 @@ class Crosser:
         self._stood = self._waited = self._since_thought = 0.0
         self._reason = ""
         self._arrived = False
+        self._stepped = -math.inf
         self._named: tuple[float, ...] | None = None
 
     def step(
@@ -136,6 +140,9 @@ class Crosser:
         self._place = self._centre.step(places, dt)
         if self._origin is None:
             self._origin = self._place
+        if self._stage is _Stage.LOOK and estimate.time - self._stepped > _PAUSE:
+            self._stage, self._stood = _Stage.SETTLE, 0.0  # half a sweep of before is none
+        self._stepped = estimate.time
         if self._stage is _Stage.SETTLE:
             return self._settle(feet, places, estimate, dt)
         if self._stage is _Stage.LOOK:
