@@ -24,8 +24,8 @@ from bluefoot_mpc.types import BodyState, FloatArray, HeightMap, SensorFrame, Tr
 
 FIT = 0.02
 """m, by which a map may differ from where a foot stands: its errors, and those of the odometry since."""
-_MOST_FEET = 3
-"""Feet that must fit: one may stand on an edge."""
+_SOME_FEET = 2
+"""Feet that must fit; one may differ, on an edge, and what is unknown under a foot speaks for nothing."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -211,7 +211,7 @@ def think(
 
 
 def _fits(known: HeightMap | None, under: FloatArray) -> bool:
-    """True where most feet stand on known ground of a map, and at its heights.
+    """True where feet stand on known ground of a map, at its heights, and no more than one at another.
 
     Args:
         known: the map; None without one.
@@ -220,7 +220,8 @@ def _fits(known: HeightMap | None, under: FloatArray) -> bool:
     if known is None:
         return False
     off = np.abs(heights_at(known, under[:, :2]) - under[:, 2])
-    return int(np.count_nonzero(off <= FIT)) >= _MOST_FEET
+    fits, differs = np.count_nonzero(off <= FIT), np.count_nonzero(off > FIT)
+    return bool(fits >= _SOME_FEET and differs <= 1)
 
 
 def region_around(pose: FloatArray, config: CrossingConfig) -> Region:
