@@ -23,7 +23,7 @@ from bluefoot_mpc.gait.gait import Gait
 from bluefoot_mpc.gait.virtual_robot import VirtualPose, carried
 from bluefoot_mpc.geometry import rotation_from_rpy
 from bluefoot_mpc.model.legs import LegGeometry
-from bluefoot_mpc.settings import require_nonnegative, require_positive
+from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
 from bluefoot_mpc.terrain.footholds import ChoiceConfig, choose, height_around, highest_between
 from bluefoot_mpc.terrain.ground import Ground
 from bluefoot_mpc.types import LEGS, BodyState, BoolArray, FloatArray
@@ -54,9 +54,11 @@ class PlacerConfig:
         """Check ranges."""
         require_nonnegative(
             room=self.room, sway=self.sway, inward=self.inward, clearance=self.clearance,
-            least_lift=self.least_lift, width=self.width, decided=self.decided, slow=self.slow,
+            least_lift=self.least_lift, decided=self.decided, slow=self.slow,
         )  # fmt: skip
-        require_positive(follow=self.follow, level_time=self.level_time, stop=self.stop)
+        require_positive(follow=self.follow, level_time=self.level_time)
+        require_range(self.slow + 1e-3, 1.0, stop=self.stop)
+        require_range(0.0, 0.2, width=self.width)
 
 
 class FootPlacer:

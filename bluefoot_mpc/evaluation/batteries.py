@@ -24,6 +24,7 @@ BATTERIES: dict[str, Callable[[], tuple[Case, ...]]] = {
     "wander": way_cases.wander_cases,
     "approach": way_cases.approach_cases,
     "follow": way_cases.follow_cases,
+    "sweep": ground_cases.sweep_cases,
     "rough": ground_cases.crossing_cases,
     "rough blind": ground_cases.blind_cases,
     "rough incremental": ground_cases.incremental_cases,

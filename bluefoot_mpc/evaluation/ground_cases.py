@@ -41,6 +41,25 @@ GROUNDS: dict[str, tuple[str, tuple[str, ...], tuple[Limit, ...]]] = {
 """Name: the world, what of it is set, and what must be reached (of the last three nobody asked it)."""
 
 
+def sweep_cases(controller: str = "mpc", seeds: tuple[int, ...] = SEEDS) -> tuple[Case, ...]:
+    """One sweep, mapped in cells of 20 mm: what the map is worth on the cells that were seen."""
+    coarse = tuple(f"control.crossing.map.{key}" for key in ("cell=0.02", "gap=1", "gap_trust=0.6"))
+    return tuple(
+        Case(
+            name=f"map of rubble {1e3 * height:.0f} mm",
+            scenario="sweep",
+            options={
+                "controller": controller,
+                "world": "rubble",
+                "overrides": (*coarse, f"sim.world.terrain_height={height}"),
+            },
+            seeds=seeds,
+            limits=MAPPED,
+        )
+        for height in (0.020, ROUGHEST)
+    )
+
+
 def crossing_cases(
     controller: str = "mpc", seeds: tuple[int, ...] = SEEDS, *, incremental: bool = False
 ) -> tuple[Case, ...]:

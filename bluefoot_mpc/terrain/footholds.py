@@ -22,13 +22,14 @@ class ChoiceConfig:
     """How far from its nominal place a foot may land, and what that costs."""
 
     radius: float = 0.075  # m, farthest
-    spread: float = 0.040  # m away that weigh as much as all of the quality
+    spread: float = 0.050  # m away that weigh as much as all of the quality
     least_quality: float = 0.10  # worse places are none, 1
     keep: float = 0.25  # gain by which another place must be better than the one chosen before, 1
 
     def __post_init__(self) -> None:
         """Check ranges."""
-        require_positive(radius=self.radius, spread=self.spread)
+        require_positive(spread=self.spread)
+        require_range(0.005, 0.3, radius=self.radius)
         require_range(0.0, 1.0, least_quality=self.least_quality)
         require_nonnegative(keep=self.keep)
 

@@ -27,6 +27,8 @@ _PLAN = PlanConfig(
     treads=TreadConfig(reach=0.065, least_quality=0.05),
 )
 """A way as straight as feet can be placed along it: a crawl follows no wiggles."""
+_MAP = MapConfig(cell=0.01, gap=2, gap_trust=0.3)
+"""Cells of half the size show edges where they are: of twice as large ones half the ground is edge."""
 _FIRST_SWEEP = SweepConfig(dwell_scans=2, pitch_max_deg=34.0)
 """So far down that what is seen begins within the ground that is taken to be even."""
 _SWEEP = SweepConfig(dwell_scans=2, pitch_max_deg=26.0)
@@ -40,7 +42,7 @@ class CrossingConfig:
     first_sweep: SweepConfig = field(default_factory=lambda: _FIRST_SWEEP)
     sweep: SweepConfig = field(default_factory=lambda: _SWEEP)
     cloud: CloudConfig = field(default_factory=CloudConfig)
-    map: MapConfig = field(default_factory=MapConfig)
+    map: MapConfig = field(default_factory=lambda: _MAP)
     merge: MergeConfig = field(default_factory=MergeConfig)
     free_space: FreeSpaceConfig = field(default_factory=FreeSpaceConfig)
     align: Bounds = field(default_factory=Bounds)
@@ -57,6 +59,7 @@ class CrossingConfig:
     settle_time: float = 0.3  # s for which all feet rest before a sweep
     think_ticks: int = 20  # command periods for mapping and planning
     patience: float = 6.0  # s that a foot may have nowhere to step before the robot looks again
+    stall: float = 40.0  # s without progress on the way, before it looks again
     attempts: int = 3  # fruitless sweeps in a row after which it stays
     progress: float = 0.05  # m that count as fruit
     incremental: bool = False  # map while walking, rather than stop and sweep

@@ -115,7 +115,8 @@ class Crosser:
         self._furthest = 0.0
         self._fruitless = 0
         self._sweeps = 0
-        self._stood = self._waited = self._since_thought = 0.0
+        self._stood = self._waited = self._since_thought = self._stalled = 0.0
+        self._nearest = math.inf
         self._reason = ""
         self._arrived = False
         self._stepped = -math.inf
@@ -203,6 +204,7 @@ class Crosser:
             self._arrive()
         elif len(thought.route.poses) > 1:
             self._stage, self._waited, self._since_thought = _Stage.WALK, 0.0, 0.0
+            self._nearest, self._stalled = math.inf, 0.0
         else:
             self._look_again(self._reason or "no way was found")
         return self._stand(CrossingPhase.THINK, thought=thought)
@@ -219,6 +221,8 @@ class Crosser:
             self._arrive()
         elif steering.left == 0.0:
             self._look_again(self._reason)
+        elif self._is_stuck(steering.left, dt):
+            self._look_again("no progress: something holds the robot")
         elif self._waited > self._config.patience:
             self._look_again(feet.waiting)
         elif self._thinker.failure:
@@ -251,6 +255,7 @@ class Crosser:
 
     def _take(self, thought: Thought) -> None:
         self._thought, self.ground = thought, thought.ground
+        self._nearest = math.inf
         self._mapper.take(thought)
 
     def _steer(self, guide: Guide, estimate: BodyState) -> Steering:
@@ -261,6 +266,13 @@ class Crosser:
         nearest = int(np.argmin(np.hypot(*(route[:, :2] - self._place).T)))
         speed = guide.speed * float(thought.pace[nearest])
         return steer(route, self._place, float(estimate.rpy[2]), speed, config)
+
+    def _is_stuck(self, left: float, dt: float) -> bool:
+        """True where the way left (m) has not become shorter for long."""
+        if left < self._nearest - self._config.progress:
+            self._nearest, self._stalled = left, 0.0
+        self._stalled += dt
+        return self._stalled > self._config.stall
 
     def _arrive(self) -> None:
         self._stage, self._arrived, self._reason = _Stage.STAY, True, ""
