@@ -28,6 +28,7 @@ BATTERIES: dict[str, Callable[[], tuple[Case, ...]]] = {
     "rough": ground_cases.crossing_cases,
     "rough blind": ground_cases.blind_cases,
     "rough incremental": ground_cases.incremental_cases,
+    "rough errors": ground_cases.error_cases,
 }
 """Each function gives the cases of its battery."""
 

@@ -88,6 +88,31 @@ def crossing_cases(
     )
 
 
+def error_cases(controller: str = "mpc", seeds: tuple[int, ...] = SEEDS[:10]) -> tuple[Case, ...]:
+    """A LIDAR that sits 5 mm and 2 degrees elsewhere than the robot believes: its maps must not topple it."""
+    upright = (Limit(figure="upright", bound=1.0, side="min", over="share", share=1.0),)
+    return tuple(
+        Case(
+            name=f"{name}, map {2.0 * sign:+.0f} degrees and {5.0 * sign:+.0f} mm",
+            scenario="rough",
+            options={
+                "controller": controller,
+                "world": GROUNDS[name][0],
+                "duration": DURATION,
+                "overrides": (
+                    *GROUNDS[name][1],
+                    f"sim.lidar.mount_error_deg=[0.0, {2.0 * sign}, 0.0]",
+                    f"sim.lidar.mount_error_m=[0.0, 0.0, {0.005 * sign}]",
+                ),
+            },
+            seeds=seeds,
+            limits=upright,
+        )
+        for name in ("rubble 20 mm", "kerb 25 mm")
+        for sign in (1.0, -1.0)
+    )
+
+
 def incremental_cases(controller: str = "mpc", seeds: tuple[int, ...] = SEEDS) -> tuple[Case, ...]:
     """The same ground, mapped while walking; nothing is asked of it but to be measured."""
     named = ("rubble 20 mm", "stepping stones")

@@ -13,6 +13,7 @@ def ground_figures(summary: Mapping[str, Any]) -> dict[str, float | None]:
     left = figures.get("goal_left_m")
     return {
         "crossed": float(summary["success"]) if is_crossing else None,
+        "upright": None if figures.get("toppled") is None else float(not figures["toppled"]),
         "goal_left_mm": None if left is None else 1e3 * left,
         "reached_s": figures.get("reached_s"),
         "sweeps": figures.get("sweeps"),

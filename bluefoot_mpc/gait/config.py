@@ -28,7 +28,7 @@ def _walk_timing() -> GaitTiming:
 
 def _rough_timing() -> GaitTiming:
     return GaitTiming(
-        swing_share=0.16,
+        swing_share=0.2,  # the walk's coupled network swings no shorter
         a_v=300.0,
         a_omega=60.0,
         cycle_min=3.0,

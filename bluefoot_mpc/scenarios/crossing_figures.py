@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from typing import Any
 
@@ -19,6 +20,8 @@ from bluefoot_mpc.types import BodyState, FloatArray, HeightMap, TruthSample
 
 MAP_REACH = 1.2
 """m from the LIDAR, within which a map is compared with the truth."""
+TOPPLED_DEG = 50.0
+"""degrees of tilt, beyond which a robot has toppled; a sweep takes it to 34."""
 _SEEN = 0.5
 """Confidence from which a cell counts as seen, not as assumed."""
 
@@ -35,6 +38,7 @@ def crossing_figures(run: RunData, goal: float, tolerance: float) -> dict[str, A
     spent = Counter(str(report.phase) for report in reports)
     return {
         **progress(run, goal, tolerance),
+        "toppled": toppled(run),
         "sweeps": reports[-1].sweeps if reports else 0,
         "phase_s": {name: round(count * run.period, 2) for name, count in sorted(spent.items())},
         "blocked": next((r.reason for r in reversed(reports) if r.phase == "blocked"), None),
@@ -58,6 +62,17 @@ def progress(run: RunData, goal: float, tolerance: float) -> dict[str, Any]:
         "reached_s": float(time[there[0]]) if there.size else None,
         "progress_m": float(way[-1]),
     }
+
+
+def toppled(run: RunData) -> bool | None:
+    """Whether the robot lay on its trunk or on its side, by the truth; links that touch do not count here."""
+    if not run.truth:
+        return None
+    upright = math.cos(math.radians(TOPPLED_DEG))
+    return any(
+        "trunk" in sample.touching or rotation_from_quaternion(sample.q[3:7])[2, 2] < upright
+        for sample in run.truth
+    )
 
 
 def map_errors(run: RunData) -> dict[str, Any]:

@@ -51,7 +51,7 @@ class RaycastLidar:
     ) -> None:
         self._model, self._data, self._trunk = model, data, trunk
         self._config, self._seed = config or LidarConfig(), seed
-        self._mount = np.array(mounts.lidar)
+        self._mount = np.array(mounts.lidar) + self._config.mount_error_m
         error = rotation_from_rpy(np.radians(self._config.mount_error_deg))
         self._turn = mounts.lidar_rotation @ error
         self._plane = np.zeros((POINTS, 2))

@@ -19,6 +19,8 @@ class LidarConfig:
     jitter_deg: float = 0.05  # degrees, standard deviation of a ray's bearing
     # degrees; how the sensor is really turned (roll, pitch, yaw), beside what the robot's parameter file says
     mount_error_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    # m; by how much it really sits elsewhere (forward, left, up)
+    mount_error_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         require_nonnegative(
@@ -28,6 +30,8 @@ class LidarConfig:
         require_range(0.0, 1.0, dropouts=self.dropouts)
         for name, angle in zip(("roll", "pitch", "yaw"), self.mount_error_deg, strict=True):
             require_range(-20.0, 20.0, **{f"mount_error_deg ({name})": angle})
+        for name, away in zip(("forward", "left", "up"), self.mount_error_m, strict=True):
+            require_range(-0.05, 0.05, **{f"mount_error_m ({name})": away})
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

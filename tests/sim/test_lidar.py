@@ -220,6 +220,16 @@ def test_a_sensor_that_is_mounted_askew_looks_where_it_is_turned(world, robot):
     assert by_error[FRONT] == pytest.approx(lens / math.sin(math.radians(12.0)), abs=1e-9)
 
 
+def test_a_sensor_that_sits_higher_looks_from_there(world, robot):
+    place(world)
+    raised = replace(PERFECT, mount_error_deg=(0.0, 12.0, 0.0), mount_error_m=(0.0, 0.0, 0.01))
+    found = RaycastLidar(world.model, world.data, world.trunk, robot.parameters.sensors, raised)
+    lens = 0.26 + robot.parameters.sensors.lidar[2]
+    assert found.look(bearings())[FRONT] == pytest.approx(lens / math.sin(math.radians(12.0)), abs=1e-9)
+    with pytest.raises(ConfigurationError, match="mount_error_m"):
+        LidarConfig(mount_error_m=(0.0, 0.0, 0.2))
+
+
 @pytest.mark.parametrize("wrong", [(0.0, 40.0, 0.0), (math.nan, 0.0, 0.0)])
 def test_impossible_mountings_are_refused(robot, wrong):
     with pytest.raises(ConfigurationError, match="mount_error_deg"):
