@@ -182,6 +182,10 @@ class Crosser:
         if seen.done:
             self._sweeps += 1
             self._reason = seen.reason
+            if guide.task is GuideTask.CROSS and not self._mapper.has_seen:
+                # What is taken to be even around the start is no reason to walk blind.
+                self._look_again(seen.reason or "the sweep met no ground")
+                return decision
             self._stage = _Stage.THINK
             self._thinker.start(self._mapper.thinking(self._pose(estimate), self._goal(guide)))
         return decision

@@ -86,6 +86,11 @@ class Mapper:
             self._known = merge(None, even_ground(under, time, self._config)) if radius > 0.0 else None
         self._stands = True
 
+    @property
+    def has_seen(self) -> bool:
+        """Whether anything was met since the sweep began, or since the last thought."""
+        return len(self._collected.builder) > 0
+
     def begin_sweep(self) -> None:
         """Forget the points of the last sweep; its map stays."""
         self._collected = Collected(self._config)
