@@ -206,9 +206,11 @@ def test_a_closed_terminal_ends_the_run_like_ctrl_c_but_not_under_nohup(setup):
         if abs(frame.time - 2.0) < 0.01:
             os.kill(os.getpid(), signal.SIGHUP)
 
-    assert run(setup, pipeline, walk.source, observers=(hang_up,)).stop_reason == INTERRUPTED
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    # Tests may themselves run under nohup.
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
     try:
+        assert run(setup, pipeline, walk.source, observers=(hang_up,)).stop_reason == INTERRUPTED
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
         assert run(setup, pipeline, walk.source, observers=(hang_up,)).stop_reason == "completed"
     finally:
         signal.signal(signal.SIGHUP, before)
