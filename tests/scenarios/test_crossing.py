@@ -1,10 +1,15 @@
 """The scenario rough: what it asks of the robot, and what it refuses."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from bluefoot_mpc.exceptions import ConfigurationError
+from bluefoot_mpc.geometry import quaternion_from_rpy
 from bluefoot_mpc.scenarios import RunOptions
 from bluefoot_mpc.scenarios.config import resolve
+from bluefoot_mpc.scenarios.crossing_figures import toppled
 from bluefoot_mpc.scenarios.registry import find_scenario
 from bluefoot_mpc.scenarios.runner import simulate
 from bluefoot_mpc.types import GuideTask, Mode
@@ -53,3 +58,17 @@ def test_a_run_that_ends_before_the_first_sweep_has_its_figures_and_fails():
     assert (figures["sweeps"], figures["map_cells"], figures["footholds"]) == (0, 0, 0)
     assert figures["goal_left_m"] == pytest.approx(1.5, abs=0.05)
     assert figures["reached_s"] is None
+
+
+def test_who_lies_on_the_trunk_or_on_the_side_has_toppled_and_a_brush_of_a_link_has_not():
+    run = simulate("rough", RunOptions(duration=0.6, world="gap")).data
+    assert toppled(run) is False
+    sample = run.truth[-1]
+    for changes, expected in (
+        ({"touching": ("FL_link4",)}, False),
+        ({"touching": ("FL_link4", "trunk")}, True),
+        ({"q": np.r_[sample.q[:3], quaternion_from_rpy(np.radians((0.0, 34.0, 0.0))), sample.q[7:]]}, False),
+        ({"q": np.r_[sample.q[:3], quaternion_from_rpy(np.radians((60.0, 0.0, 0.0))), sample.q[7:]]}, True),
+    ):
+        assert toppled(replace(run, truth=[*run.truth, replace(sample, **changes)])) is expected
+    assert toppled(replace(run, truth=[])) is None
