@@ -18,6 +18,7 @@ import numpy as np
 
 from bluefoot_mpc.control.foot_contact import FootContacts, TouchConfig
 from bluefoot_mpc.control.leg_reach import LegReach
+from bluefoot_mpc.control.support import SupportConfig, SupportPlane
 from bluefoot_mpc.gait.ahead import leg_phases
 from bluefoot_mpc.gait.gait import Gait
 from bluefoot_mpc.gait.virtual_robot import VirtualPose, carried
@@ -35,6 +36,7 @@ class PlacerConfig:
 
     choice: ChoiceConfig = field(default_factory=ChoiceConfig)
     touch: TouchConfig = field(default_factory=TouchConfig)
+    support: SupportConfig = field(default_factory=SupportConfig)
     room: float = 0.07  # rad that legs keep to their limits where they land and lift
     sway: float = 0.020  # m that the trunk may be farther from a foot that lands or lifts
     inward: float = 0.040  # m inward of its place beside the trunk that a foot may stand
@@ -46,7 +48,6 @@ class PlacerConfig:
     learn: float = 0.3  # share of a foot's miss by which its next goals are moved the other way
     learn_after: float = 0.1  # s after a landing, when its miss is measured
     learn_most: float = 0.012  # m, largest such move
-    level_time: float = 0.4  # s, with which the trunk follows the mean height of the feet
     slow: float = 0.060  # m behind its place, from which a standing foot slows the walk
     stop: float = 0.085  # m behind its place, at which it stops it
 
@@ -56,7 +57,7 @@ class PlacerConfig:
             room=self.room, sway=self.sway, inward=self.inward, clearance=self.clearance,
             least_lift=self.least_lift, decided=self.decided, slow=self.slow,
         )  # fmt: skip
-        require_positive(follow=self.follow, level_time=self.level_time)
+        require_positive(follow=self.follow)
         require_range(self.slow + 1e-3, 1.0, stop=self.stop)
         require_range(0.0, 0.2, width=self.width)
 
@@ -68,7 +69,7 @@ class FootPlacer:
         footholds: (4, 3) m in the odometry frame, ground where the feet land next; NaN where none was chosen.
         lift: (4,) m that the next swings rise; NaN likewise.
         waiting: why a foot does not go on, in few words; empty while all do.
-        level: m, height of the plane that the trunk's height counts from, over that of the gait.
+        support: plane that the trunk's height counts from, and how the trunk leans with it.
         pace: share of the commanded speed that the footholds allow.
 
     Args:
@@ -80,11 +81,13 @@ class FootPlacer:
         self._config = config
         self._reach = LegReach(geometry)
         self._contacts = FootContacts(config.touch)
+        self.support = SupportPlane(config.support)
         self.reset()
 
     def reset(self) -> None:
         """Forget the ground."""
         self._contacts.reset()
+        self.support.reset()
         self._active = False
         self._turn, self._shift = 0.0, 0j  # odometry to the gait's world
         self._bias = [0j] * 4  # m, ahead and left, by which each foot misses its places on the whole
@@ -95,7 +98,6 @@ class FootPlacer:
         self.lift = np.full(4, np.nan)
         self._reasons = [""] * 4
         self.waiting = ""
-        self.level = 0.0
         self._aim = np.full((4, 3), np.nan)  # where feet in the air go to
         self.pace = 1.0
 
@@ -110,7 +112,7 @@ class FootPlacer:
         """
         if ground is None:
             if self._active:
-                gait.forget_steps(self.level)
+                gait.forget_steps(self.support.level)
                 self.reset()
             return
         if not estimate.healthy:
@@ -214,18 +216,20 @@ class FootPlacer:
         # A foot far inward makes the support of its neighbours' steps thin.
         held = local.imag * math.copysign(1.0, nominal.imag) >= abs(nominal.imag) - self._config.inward
         sway = self._config.sway * nominal / abs(nominal)
-        z = places[:, 2] - self.level - style.trunk_height
+        z = places[:, 2] - self.support.level - style.trunk_height
+        roll, pitch = self.support.tilt.tolist()
+        rotation_base_to_virtual = rotation_from_rpy(np.array([roll, pitch, 0.0]))
         # Near its hip a leg is folded as far as it goes, so both ways count.
         for aside in (sway, -sway):
             away = local - style.trunk_forward + aside
-            held &= self._reach.holds(leg, np.column_stack([away.real, away.imag, z]), self._config.room)
+            feet = np.column_stack([away.real, away.imag, z]) @ rotation_base_to_virtual
+            held &= self._reach.holds(leg, feet, self._config.room)
         return np.asarray(held)
 
     def _follow_feet(self, gait: Gait, dt: float) -> None:
-        """Height of the trunk's plane, and how fast the walk may go on."""
+        """The plane under the trunk, and how fast the walk may go on."""
         state, config = gait.state, self._config
-        heights = [foot.goal_z if foot.swinging and foot.goal is not None else foot.z for foot in state.feet]
-        self.level += min(1.0, dt / config.level_time) * (sum(heights) / 4.0 - self.level)
+        self.support.step(_supports(gait), dt, walking=state.walking)
         speed = abs(state.wanted) or abs(state.velocity)
         if speed == 0.0:
             self.pace = 1.0
@@ -237,3 +241,14 @@ class FootPlacer:
         ]  # fmt: skip
         worst = max(behind, default=0.0)
         self.pace = min(1.0, max(0.0, (config.stop - worst) / (config.stop - config.slow)))
+
+
+def _supports(gait: Gait) -> FloatArray:
+    """(4, 3) m in b', upwards in the gait's world: where each foot stands, or lands if it swings."""
+    places = []
+    for foot in gait.state.feet:
+        place, z = foot.in_b(gait.state.pose), foot.z
+        if foot.swinging and foot.goal is not None:
+            place, z = gait.state.pose.to_local(foot.goal), foot.goal_z
+        places.append((place.real, place.imag, z))
+    return np.array(places)

@@ -168,7 +168,7 @@ class Pipeline:
         self._told = gait.velocity
         gait = self._on_the_ground(gait, estimate, upright, dt)
         footing = self._footing(estimate)
-        reference, zmp, held = self._trunk.step(gait, motion, estimate, footing, dt)
+        reference, zmp, held = self._trunk.step(gait, self._leant(motion), estimate, footing, dt)
         self._targets.stand_up(self._guidance.ground is not None, dt)
         joints, cut = self._targets.step(reference, frame, dt, gait.style.ankle_shift)
         plan = self._planned(gait, reference, joints, frame)
@@ -277,7 +277,7 @@ class Pipeline:
     ) -> GaitOutput:
         """The gait with its feet on the ground's slope, or over the mean height of its footholds."""
         if self._guidance.ground is not None:
-            return replace(gait, foot_position=gait.foot_position - (0.0, 0.0, self._placer.level))
+            return replace(gait, foot_position=gait.foot_position - (0.0, 0.0, self._placer.support.level))
         if not self.config.ground.enabled:
             return gait
         if estimate.healthy:
@@ -285,6 +285,13 @@ class Pipeline:
             feet = estimate.foot_position_in_base @ upright.T
             self._ground.step(feet, standing, dt, walking=gait.phase.walking)
         return replace(gait, foot_position=self._ground.place(gait.foot_position, gait.foot_height))
+
+    def _leant(self, motion: MotionCommand) -> MotionCommand:
+        """The command, with the trunk leant as the footholds ask for."""
+        tilt = self._placer.support.tilt
+        if not tilt.any():
+            return motion
+        return replace(motion, trunk=replace(motion.trunk, rpy=motion.trunk.rpy + np.append(tilt, 0.0)))
 
     def _planned(
         self, gait: GaitOutput, reference: PostureReference, joints: FloatArray, frame: SensorFrame

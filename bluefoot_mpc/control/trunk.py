@@ -156,7 +156,7 @@ class TrunkPlanner:
             self._held = False
             return ()
         result = self._reach(self._reference(gait, wanted, height))
-        if result.feasible or self._is_closer_to_neutral(wanted):
+        if result.feasible or self._is_closer_to_neutral(wanted) or self._leads_back(gait, motion, height):
             self._pose, self._held = wanted, False
             return ()
         if self._held:
@@ -167,6 +167,15 @@ class TrunkPlanner:
     def _is_closer_to_neutral(self, wanted: FloatArray) -> bool:
         # The way back must never be barred, whatever the feet do meanwhile.
         return float(np.abs(wanted).sum()) < float(np.abs(self._pose).sum())
+
+    def _leads_back(self, gait: GaitOutput, motion: MotionCommand, height: float) -> bool:
+        """True where the legs hold the commanded pose, but not the one in force."""
+        commanded = np.array([*motion.trunk.position.tolist(), *motion.trunk.rpy.tolist()])
+        pose, reach = self._pose, self._reach
+        return (
+            reach(self._reference(gait, commanded, height)).feasible
+            and not reach(self._reference(gait, pose, height)).feasible
+        )
 
     def _reference(self, gait: GaitOutput, pose: FloatArray, height: float) -> PostureReference:
         x, y, z, roll, pitch, yaw = pose.tolist()

@@ -26,6 +26,8 @@ class SweepConfig:
 
     pitch_min_deg: float = 11.0  # degrees nose down; the plane then meets level ground 1.27 m ahead
     pitch_max_deg: float = 31.0  # degrees nose down; 0.44 m ahead
+    steepest_deg: float = 34.0  # degrees nose down, where the ground ahead drops
+    drop: float = 0.03  # m by which it does, at least, within the range of level ground
     spacing: Literal["ground", "pitch"] = "ground"  # levels even along level ground, or even in pitch
     ground_step: float = 0.014  # m between the lines of neighbouring levels on level ground
     count: int = 40  # steps between levels that are even in pitch (N_s in the thesis)
@@ -58,6 +60,8 @@ class SweepConfig:
             return_time=self.return_time, level_deg=self.level_deg, scan_timeout=self.scan_timeout,
             max_lead_deg=self.max_lead_deg,
         )  # fmt: skip
+        require_range(1.0, 45.0, steepest_deg=self.steepest_deg)
+        require_positive(drop=self.drop)
         require_range(1, MAX_LEVELS, count=self.count)
         require_range(1, 50, dwell_scans=self.dwell_scans)
         require_range(0.002, 0.5, ground_step=self.ground_step)
@@ -88,12 +92,12 @@ def line_ahead(pitch: FloatArray | float, height: float, lift: float) -> FloatAr
     return np.asarray((height * np.cos(pitch) + lift) / sin)
 
 
-def pitch_for(distance: FloatArray | float, height: float, lift: float) -> FloatArray:
+def pitch_for(distance: FloatArray | float, height: FloatArray | float, lift: float) -> FloatArray:
     """(...,) rad, pitch at which the plane meets level ground at `distance`; the inverse of `line_ahead`.
 
     Args:
         distance: (...,) m ahead of the trunk's origin, positive.
-        height: m, trunk origin above the ground.
+        height: (...,) m, trunk origin above the ground there.
         lift: m, LIDAR above the trunk origin.
     """
     away = np.asarray(distance, dtype=np.float64)
@@ -121,6 +125,35 @@ def levels(config: SweepConfig, height: float, lift: float) -> FloatArray:
     if not known:
         return np.asarray((high - low) * np.arange(count + 1) / count + low)
     return pitch_for(np.linspace(far, near, count + 1), height, lift)
+
+
+def levels_along(
+    config: SweepConfig, height: float, lift: float, distance: FloatArray, ground: FloatArray
+) -> FloatArray:
+    """(n,) rad, wanted pitches of a sweep over ground of which the heights are expected, rising.
+
+    On ground that drops ahead, the lines of level ground would lie far apart: rays are nearly as steep as it.
+    Here they are even along what is expected. Ground that does not drop is swept as level ground is.
+
+    Args:
+        config: range and spacing.
+        height: m, trunk origin above the ground under the robot.
+        lift: m, LIDAR above the trunk origin.
+        distance: (k,) m ahead of the trunk's origin, rising.
+        ground: (k,) m, expected heights there, over the ground under the robot.
+    """
+    as_level = levels(config, height, lift)
+    low, high = config.pitch_range
+    far = float(line_ahead(low, height, lift))
+    drops = distance[(ground <= -config.drop) & (distance <= far)]
+    if config.spacing == "pitch" or not len(drops) or not math.isfinite(height) or height <= 0.0:
+        return as_level
+    steepest = max(high, math.radians(config.steepest_deg))
+    along = np.arange(config.ground_step, distance[-1], config.ground_step)
+    pitch = pitch_for(along, height - np.interp(along, distance, ground), lift)
+    nearest = np.minimum.accumulate(np.concatenate(([math.inf], pitch[:-1])))
+    seen = (pitch < nearest) & (pitch >= low) & (pitch <= steepest)
+    return np.sort(pitch[seen])[:MAX_LEVELS] if seen.any() else as_level
 
 
 def advance(wanted: float, level: float, estimated: float, dt: float, config: SweepConfig) -> float:

@@ -62,7 +62,7 @@ def test_without_ground_nobody_is_told_anything(geometry):
     gait, placer = placed(geometry, None)
     assert all(foot.goal is None for foot in gait.state.feet)
     assert placer.pace == 1.0
-    assert placer.level == 0.0
+    assert placer.support.level == 0.0
 
 
 def test_places_of_the_map_are_met_however_the_odometry_is_shifted(geometry):

@@ -129,6 +129,17 @@ def test_a_pose_out_of_reach_is_followed_as_far_as_the_legs_hold_it_and_said_onc
     assert bench.reference.trunk_position[0] == 0.0
 
 
+def test_a_pose_within_reach_is_gone_to_through_poses_that_are_not(robot):
+    bench = Bench(robot)
+    settle(bench, 2.0, motion=pose(x=0.09))
+    settle(bench, 1.0, motion=pose(x=0.09), sit_level=-0.25)
+    assert not bench.targets.reach(bench.reference).feasible
+    # Farther from neutral on the whole than before, but held by the legs where it ends.
+    settle(bench, 4.0, motion=pose(x=0.02, roll=0.1), sit_level=-0.25)
+    assert bench.targets.reach(bench.reference).feasible
+    np.testing.assert_allclose(bench.reference.trunk_rpy, (0.1, 0.0, 0.0), atol=1e-9)
+
+
 def test_the_way_back_is_open_even_where_the_legs_no_longer_reach(robot):
     bench = Bench(robot)
     settle(bench, 2.0, motion=pose(x=0.09))

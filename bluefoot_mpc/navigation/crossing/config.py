@@ -15,6 +15,7 @@ from bluefoot_mpc.terrain.free_space import FreeSpaceConfig
 from bluefoot_mpc.terrain.ground import RatingConfig
 from bluefoot_mpc.terrain.height_map import LARGEST, MapConfig
 from bluefoot_mpc.terrain.merge import MergeConfig
+from bluefoot_mpc.terrain.outlook import OutlookConfig
 from bluefoot_mpc.terrain.plan import PlanConfig
 from bluefoot_mpc.terrain.registration import Bounds
 from bluefoot_mpc.terrain.sweep import SweepConfig
@@ -48,6 +49,7 @@ class CrossingConfig:
     align: Bounds = field(default_factory=Bounds)
     rating: RatingConfig = field(default_factory=RatingConfig)
     plan: PlanConfig = field(default_factory=lambda: _PLAN)
+    outlook: OutlookConfig = field(default_factory=OutlookConfig)
     pace: PaceConfig = field(default_factory=PaceConfig)
     follower: FollowerConfig = field(default_factory=FollowerConfig)
     start_radius: float = 0.45  # m around the feet at the start, within which the ground is taken to be even
@@ -56,12 +58,16 @@ class CrossingConfig:
     behind: float = 0.7  # m
     aside: float = 0.8  # m to either side
     stretch: float = 0.50  # m that are walked from one sweep to the next
+    least_stretch: float = 0.20  # m, where less ground ahead is known
+    overlap: float = 0.50  # m ahead that a sweep does not see: known ground is not left nearer than that
     settle_time: float = 0.3  # s for which all feet rest before a sweep
     think_ticks: int = 20  # command periods for mapping and planning
     patience: float = 6.0  # s that a foot may have nowhere to step before the robot looks again
     stall: float = 40.0  # s without progress on the way, before it looks again
     attempts: int = 3  # fruitless sweeps in a row after which it stays
     progress: float = 0.05  # m that count as fruit
+    lean_deg: float = 25.0  # degrees by which the trunk may lean otherwise than told
+    lean_time: float = 0.5  # s, for that long; then it stays
     incremental: bool = False  # map while walking, rather than stop and sweep
     rethink_time: float = 1.5  # s between two plans on the way, then
     walking_pitch_deg: float = 18.0  # degrees nose down in the mean, then
@@ -70,14 +76,15 @@ class CrossingConfig:
 
     def __post_init__(self) -> None:
         require_nonnegative(
-            settle_time=self.settle_time, patience=self.patience,
+            settle_time=self.settle_time, patience=self.patience, overlap=self.overlap,
             progress=self.progress, walking_swing_deg=self.walking_swing_deg,
         )  # fmt: skip
         require_range(0.0, 2.0, start_radius=self.start_radius)
         require_range(0.2, 5.0, ahead=self.ahead, behind=self.behind, aside=self.aside)
         self._require_a_map_of_some_size()
         require_positive(
-            stretch=self.stretch, rethink_time=self.rethink_time, walking_period=self.walking_period,
+            stretch=self.stretch, least_stretch=self.least_stretch, rethink_time=self.rethink_time,
+            walking_period=self.walking_period, lean_deg=self.lean_deg, lean_time=self.lean_time,
         )  # fmt: skip
         require_range(0.0, 1.0, start_confidence=self.start_confidence)
         require_range(0.0, 31.0, walking_pitch_deg=self.walking_pitch_deg)

@@ -30,6 +30,7 @@ from bluefoot_mpc.types import (
 
 _STILL = np.zeros(2)
 _NOTHING = np.zeros((0, 3))
+LEANS = "the trunk leans as nobody told it to: the robot fell, or lies on something; lift it up"
 _PAUSE = 0.3
 """s without a tick, after which a sweep begins anew: the robot was told to do something else."""
 
@@ -115,7 +116,8 @@ class Crosser:
         self._furthest = 0.0
         self._fruitless = 0
         self._sweeps = 0
-        self._stood = self._waited = self._since_thought = self._stalled = 0.0
+        self._stood = self._waited = self._since_thought = self._stalled = self._leant = 0.0
+        self._pitch = 0.0
         self._nearest = math.inf
         self._reason = ""
         self._arrived = False
@@ -144,6 +146,8 @@ class Crosser:
         if self._stage is _Stage.LOOK and estimate.time - self._stepped > _PAUSE:
             self._stage, self._stood = _Stage.SETTLE, 0.0  # half a sweep of before is none
         self._stepped = estimate.time
+        if self._leans(estimate, dt) and self._stage is not _Stage.STAY:
+            self._stage, self._reason = _Stage.STAY, LEANS
         if self._stage is _Stage.SETTLE:
             return self._settle(feet, places, estimate, dt)
         if self._stage is _Stage.LOOK:
@@ -153,6 +157,13 @@ class Crosser:
         if self._stage is _Stage.WALK:
             return self._walk(guide, frame, estimate, feet, dt)
         return self._stand(CrossingPhase.ARRIVED if self._arrived else CrossingPhase.BLOCKED)
+
+    def _leans(self, estimate: BodyState, dt: float) -> bool:
+        """True where the trunk has been far from its wanted tilt for long: no place to walk on from."""
+        roll, pitch, _ = np.degrees(estimate.rpy).tolist()
+        leans = max(abs(roll), abs(pitch - math.degrees(self._pitch))) > self._config.lean_deg
+        self._leant = self._leant + dt if leans else 0.0
+        return self._leant > self._config.lean_time
 
     def _begin_where_the_goal_is_new(self, guide: Guide) -> None:
         """Another goal is another task: whoever has arrived, or was blocked, sets out again."""
@@ -170,7 +181,7 @@ class Crosser:
             self._mapper.stand_on(places, estimate.time)
             self._mapper.begin_sweep()
             self._sweeper = self._later_sweeper if self._sweeps else self._first_sweeper
-            self._sweeper.begin(estimate.time)
+            self._sweeper.begin(estimate.time, self._mapper.ahead(self._pose(estimate)))
             self._stage = _Stage.LOOK
         return self._stand(CrossingPhase.SWEEP)
 
@@ -233,7 +244,8 @@ class Crosser:
             self._look_again(self._why_no_thought())
         report = self._report(CrossingPhase.WALK, points=points, thought=thought)
         trunk = self._mapper.trunk_on_the_way(estimate.time)
-        report = replace(report, speed=float(np.hypot(*steering.velocity)), pitch=float(trunk.rpy[1]))
+        self._pitch = float(trunk.rpy[1])
+        report = replace(report, speed=float(np.hypot(*steering.velocity)), pitch=self._pitch)
         return CrossingDecision(
             velocity=steering.velocity, yaw_rate=steering.yaw_rate, trunk=trunk, report=report
         )
@@ -316,7 +328,8 @@ class Crosser:
     ) -> CrossingDecision:  # fmt: skip
         trunk = trunk or TrunkPose()
         report = replace(self._report(phase, points=points, thought=thought), level=level)
-        report = replace(report, pitch=float(trunk.rpy[1]), reason=reason or report.reason)
+        self._pitch = float(trunk.rpy[1])
+        report = replace(report, pitch=self._pitch, reason=reason or report.reason)
         return CrossingDecision(velocity=_STILL, yaw_rate=0.0, trunk=trunk, report=report)
 
     def _report(self, phase: CrossingPhase, *, points: FloatArray, thought: Thought | None) -> CrossingReport:

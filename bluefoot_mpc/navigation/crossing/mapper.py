@@ -18,6 +18,7 @@ from bluefoot_mpc.terrain.free_space import carved
 from bluefoot_mpc.terrain.ground import Ground, rate_ground
 from bluefoot_mpc.terrain.height_map import MapBuilder, Region
 from bluefoot_mpc.terrain.merge import Walked, merge
+from bluefoot_mpc.terrain.outlook import Outlook, outlook
 from bluefoot_mpc.terrain.plan import Route, plan_route
 from bluefoot_mpc.terrain.registration import align, moved
 from bluefoot_mpc.types import BodyState, FloatArray, HeightMap, SensorFrame, TrunkPose
@@ -90,6 +91,10 @@ class Mapper:
     def has_seen(self) -> bool:
         """Whether anything was met since the sweep began, or since the last thought."""
         return len(self._collected.builder) > 0
+
+    def ahead(self, pose: FloatArray) -> Outlook | None:
+        """The ground ahead of a pose (3,) m, m, rad, as far as it is known; None where none is."""
+        return None if self._known is None else outlook(self._known, pose, self._config.outlook)
 
     def begin_sweep(self) -> None:
         """Forget the points of the last sweep; its map stays."""
@@ -210,9 +215,16 @@ def think(
     x, y, yaw = aim.pose.tolist()
     goal_x, goal_y = aim.goal.tolist()
     route = plan_route(ground.map, (x, y, yaw), (goal_x, goal_y), config.plan, ground.quality)
-    route = shortened(route, config.stretch)
+    route = shortened(route, _stretch(ground.map, aim.pose, config))
     pace = paces(ground.map, route.poses, config.pace) if len(route.poses) else np.zeros(0)
     return Thought(ground=ground, route=route, pace=pace, drift=drift)
+
+
+def _stretch(ground: HeightMap, pose: FloatArray, config: CrossingConfig) -> float:
+    """M to walk before the next sweep: from its end that one sees on where known ground ends."""
+    ahead = outlook(ground, pose, config.outlook)
+    known = 0.0 if ahead is None else ahead.known_until
+    return min(max(known - config.overlap, config.least_stretch), config.stretch)
 
 
 def _fits(known: HeightMap | None, under: FloatArray) -> bool:

@@ -14,7 +14,8 @@ from bluefoot_mpc.model.parameters import SensorMounts
 from bluefoot_mpc.navigation.crossing.pose_track import PoseTrack
 from bluefoot_mpc.navigation.crossing.sweep_stance import best_shift
 from bluefoot_mpc.terrain.cloud import CloudConfig, lidar_place, scan_points
-from bluefoot_mpc.terrain.sweep import SweepConfig, advance, levels
+from bluefoot_mpc.terrain.outlook import Outlook
+from bluefoot_mpc.terrain.sweep import SweepConfig, advance, levels, levels_along
 from bluefoot_mpc.types import BodyState, FloatArray, LidarScan, SensorFrame, TrunkPose
 
 AHEAD = 0.05
@@ -110,6 +111,7 @@ class Sweeper:
         """Forget everything: the state after ``__init__``, bit for bit."""
         self._track = PoseTrack()
         self._levels: FloatArray = np.zeros(0)
+        self._ahead: Outlook | None = None
         self._shift: FloatArray = np.zeros(3)
         self._furthest = _SOME_PITCH
         self._heard, self._scan_time, self._fault = -math.inf, -math.inf, ""
@@ -117,13 +119,15 @@ class Sweeper:
         self._wanted, self._level, self._scans = 0.0, 0, 0
         self._reached, self._missed_in_a_row, self._reason = 0, 0, "no sweep was begun"
 
-    def begin(self, time: float) -> None:
+    def begin(self, time: float, ahead: Outlook | None = None) -> None:
         """Start a sweep.
 
         Args:
             time: s, of the frame.
+            ahead: ground that is expected; None is level ground.
         """
         self.reset()
+        self._ahead = ahead
         self._heard, self._reason = time, ""
         self._enter(_Stage.APPROACH, time)
 
@@ -198,15 +202,24 @@ class Sweeper:
         """To the first level."""
         config = self._config
         if not len(self._levels):
+            self._levels = self._planned(estimate)
             self._shift = np.array((config.forward, 0.0, config.raised))
             if self._legs is not None:
-                self._shift = best_shift(estimate, self._legs, config.pitch_range[1], self._shift)
-            self._levels = levels(config, estimate.height + float(self._shift[2]), self._mounts.lidar[2])
-            self._wanted = min(max(float(estimate.rpy[1]), 0.0), config.pitch_range[1])
+                self._shift = best_shift(estimate, self._legs, float(self._levels[-1]), self._shift)
+            self._wanted = min(max(float(estimate.rpy[1]), 0.0), float(self._levels[-1]))
         first, pitch = float(self._levels[0]), float(estimate.rpy[1])
         self._wanted += min(max(first - self._wanted, -config.max_rate * dt), config.max_rate * dt)
         if abs(first - pitch) <= self._tolerance or time - self._since > config.approach_time:
             self._enter(_Stage.LEVELS, time)
+
+    def _planned(self, estimate: BodyState) -> FloatArray:
+        """(n,) rad, levels over level ground, or over what is expected ahead."""
+        config = self._config
+        height, lift = estimate.height + config.raised, self._mounts.lidar[2]
+        if self._ahead is None:
+            return levels(config, height, lift)
+        ahead = self._ahead
+        return levels_along(config, height, lift, ahead.distance, ahead.height - ahead.height[0])
 
     def _look(self, scan: LidarScan | None, estimate: BodyState, time: float, dt: float) -> _Seen:
         """At the present level; then on to the next."""

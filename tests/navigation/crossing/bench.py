@@ -31,7 +31,7 @@ class SeesAll:
     def reset(self):
         self.begun = False
 
-    def begin(self, time):
+    def begin(self, time, ahead=None):
         self.begun = True
 
     def step(self, frame, estimate, dt):
@@ -58,12 +58,13 @@ def frame(time):
     )  # fmt: skip
 
 
-def estimate(time, pose):
+def estimate(time, pose, tilt=(0.0, 0.0)):
     x, y, yaw = pose
+    rpy = np.array([*tilt, yaw])
     feet = np.column_stack((FEET, np.full(4, -0.11)))
     return BodyState(
-        time=time, position=np.array([x, y, 0.11]), rpy=np.array([0.0, 0.0, yaw]),
-        quaternion=quaternion_from_rpy(np.array([0.0, 0.0, yaw])), linear_velocity=np.zeros(3),
+        time=time, position=np.array([x, y, 0.11]), rpy=rpy,
+        quaternion=quaternion_from_rpy(rpy), linear_velocity=np.zeros(3),
         angular_velocity=np.zeros(3), joint_position=np.zeros(16), joint_velocity=np.zeros(16),
         contact=np.ones(4, dtype=bool), foot_position_in_base=feet, height=0.11,
     )  # fmt: skip
@@ -79,12 +80,15 @@ class Bench:
         monkeypatch.setattr(crosser, "Sweeper", sweeper)
         self.crosser = Crosser(CrossingConfig(think_ticks=1, follower=QUICK, **changes), ROBOT)
         self.pose, self.time, self.reports = np.zeros(3), 0.0, []
+        self.tilt = (0.0, 0.0)  # rad, roll and pitch
 
     def run(self, seconds, goal=(1.5, 0.0), task=GuideTask.CROSS, speed=0.05, waiting=""):
         guide = Guide(task=task, speed=speed, waypoints=np.array([goal]))
         for _ in range(round(seconds / DT)):
             state = FeetState(resting=True, waiting=waiting)
-            found = self.crosser.step(guide, frame(self.time), estimate(self.time, self.pose), state, DT)
+            found = self.crosser.step(
+                guide, frame(self.time), estimate(self.time, self.pose, self.tilt), state, DT
+            )
             self.reports.append(found.report)
             c, s = math.cos(self.pose[2]), math.sin(self.pose[2])
             x, y = found.velocity

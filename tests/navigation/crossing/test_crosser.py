@@ -142,3 +142,36 @@ def test_an_estimate_that_is_no_number_moves_nothing_and_is_forgotten(monkeypatc
     assert "no number" in found.report.reason
     bench.pose = pose
     assert bench.run(40.0).phase is CrossingPhase.ARRIVED
+
+
+@pytest.mark.parametrize("tilt", [(0.5, 0.0), (0.0, -0.5)])
+def test_a_robot_that_lies_on_something_goes_nowhere(monkeypatch, tilt):
+    bench = Bench(monkeypatch)
+    assert bench.run(8.0).phase is CrossingPhase.WALK
+    bench.tilt = tilt
+    bench.run(0.3)
+    bench.tilt = (0.0, 0.0)  # a moment is none
+    assert bench.run(1.0).phase is CrossingPhase.WALK
+    bench.tilt = tilt
+    last = bench.run(1.0)
+    assert last.phase is CrossingPhase.BLOCKED
+    assert "leans" in last.reason
+    before = bench.pose.copy()
+    bench.tilt = (0.0, 0.0)
+    bench.run(5.0)
+    np.testing.assert_array_equal(bench.pose, before)
+
+
+def test_it_stops_where_the_next_sweep_can_still_see_the_end_of_what_is_known(monkeypatch):
+    # Ground of which nothing comes back between 0.85 and 1.0 m is first seen from nearer.
+    def world(x, y):
+        return np.where((x > 0.85) & (x < 1.0), np.nan, 0.0)
+
+    bench = Bench(monkeypatch, world=world)
+    bench.run(30.0)
+    stops = [report for report in bench.reports if len(report.route)]
+    assert np.hypot(*stops[0].route[-1, :2]) == pytest.approx(0.35, abs=0.05)
+    plain = Bench(monkeypatch)
+    plain.run(10.0)
+    first = next(report for report in plain.reports if len(report.route))
+    assert np.hypot(*first.route[-1, :2]) == pytest.approx(0.5, abs=0.05)
