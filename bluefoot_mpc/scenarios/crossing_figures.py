@@ -39,6 +39,7 @@ def crossing_figures(run: RunData, goal: float, tolerance: float) -> dict[str, A
     return {
         **progress(run, goal, tolerance),
         "toppled": toppled(run),
+        "touched": touched(run),
         "sweeps": reports[-1].sweeps if reports else 0,
         "phase_s": {name: round(count * run.period, 2) for name, count in sorted(spent.items())},
         "blocked": next((r.reason for r in reversed(reports) if r.phase == "blocked"), None),
@@ -73,6 +74,12 @@ def toppled(run: RunData) -> bool | None:
         "trunk" in sample.touching or rotation_from_quaternion(sample.q[3:7])[2, 2] < upright
         for sample in run.truth
     )
+
+
+def touched(run: RunData) -> dict[str, float]:
+    """S for which each part above a foot's ball touched anything, the longest first; truth."""
+    ticks = Counter(name for sample in run.truth for name in sample.touching)
+    return {name: round(count * run.period, 2) for name, count in ticks.most_common()}
 
 
 def map_errors(run: RunData) -> dict[str, Any]:

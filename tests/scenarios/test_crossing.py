@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bluefoot_mpc.evaluation.ground_measure import ground_figures
 from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.geometry import quaternion_from_rpy
 from bluefoot_mpc.scenarios import RunOptions
 from bluefoot_mpc.scenarios.config import resolve
-from bluefoot_mpc.scenarios.crossing_figures import toppled
+from bluefoot_mpc.scenarios.crossing_figures import toppled, touched
 from bluefoot_mpc.scenarios.registry import find_scenario
 from bluefoot_mpc.scenarios.runner import simulate
 from bluefoot_mpc.types import GuideTask, Mode
@@ -72,3 +73,20 @@ def test_who_lies_on_the_trunk_or_on_the_side_has_toppled_and_a_brush_of_a_link_
     ):
         assert toppled(replace(run, truth=[*run.truth, replace(sample, **changes)])) is expected
     assert toppled(replace(run, truth=[])) is None
+
+
+def test_what_touched_is_told_with_how_long():
+    run = simulate("rough", RunOptions(duration=0.6, world="gap")).data
+    sample = run.truth[-1]
+    brushes = [replace(sample, touching=("FL_link4",)), replace(sample, touching=("FL_link4", "trunk"))]
+    assert touched(replace(run, truth=[*run.truth, *brushes])) == {"FL_link4": 0.04, "trunk": 0.02}
+
+
+@pytest.mark.parametrize(
+    ("links", "reached", "expected"),
+    [({}, 9.0, 1.0), ({"FL_link4": 0.2}, 9.0, 1.0), ({"FL_link3": 0.2}, 9.0, 0.0), ({}, None, 0.0)],
+)
+def test_who_reached_the_line_and_brushed_with_last_links_only(links, reached, expected):
+    figures = {"goal_left_m": 0.0, "reached_s": reached, "touched": links, "toppled": False}
+    assert ground_figures({"success": False, "figures": figures})["brushed_at_most"] == expected
+    assert ground_figures({"success": True, "figures": {}})["brushed_at_most"] is None
