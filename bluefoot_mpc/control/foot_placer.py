@@ -55,11 +55,13 @@ class PlacerConfig:
         """Check ranges."""
         require_nonnegative(
             room=self.room, sway=self.sway, inward=self.inward, clearance=self.clearance,
-            least_lift=self.least_lift, decided=self.decided, slow=self.slow,
+            least_lift=self.least_lift, decided=self.decided, slow=self.slow, learn_after=self.learn_after,
+            learn_most=self.learn_most,
         )  # fmt: skip
         require_positive(follow=self.follow)
         require_range(self.slow + 1e-3, 1.0, stop=self.stop)
         require_range(0.0, 0.2, width=self.width)
+        require_range(0.0, 1.0, learn=self.learn)
 
 
 class FootPlacer:
@@ -88,7 +90,7 @@ class FootPlacer:
         """Forget the ground."""
         self._contacts.reset()
         self.support.reset()
-        self._active = False
+        self._active = self._aligned = False
         self._turn, self._shift = 0.0, 0j  # odometry to the gait's world
         self._bias = [0j] * 4  # m, ahead and left, by which each foot misses its places on the whole
         self._landed = [math.inf] * 4  # s since it landed
@@ -125,7 +127,8 @@ class FootPlacer:
         self._active = True
         self._next = (self._next + 1) % 4
         self._plan(ground, places, gait, self._next)
-        self.waiting = next((reason for reason in self._reasons if reason), "")
+        missed = (f"{LEGS[leg]}: it found no ground" for leg in np.flatnonzero(self._contacts.missing))
+        self.waiting = next((reason for reason in (*self._reasons, *missed) if reason), "")
         self._follow_feet(gait, dt)
 
     def _learn(self, places: FloatArray, yaw: float, gait: Gait, dt: float) -> None:
@@ -153,7 +156,8 @@ class FootPlacer:
         seen = places[standing, 0] + 1j * places[standing, 1]
         told = np.array([feet[leg].anchor for leg in standing])
         turn = cmath.phase(complex(((told - told.mean()) * np.conj(seen - seen.mean())).sum()))
-        share = 1.0 if not self._active else min(1.0, dt / self._config.follow)
+        share = 1.0 if not self._aligned else min(1.0, dt / self._config.follow)
+        self._aligned = True
         middle = complex(seen.mean())
         self._turn += share * math.remainder(turn - self._turn, 2.0 * math.pi)
         shift = complex(told.mean()) - cmath.rect(1.0, self._turn) * middle
@@ -177,7 +181,10 @@ class FootPlacer:
     def _plan(self, ground: Ground, places: FloatArray, gait: Gait, leg: int) -> None:
         """Look anew where a standing leg goes next."""
         state, foot = gait.state, gait.state.feet[leg]
-        if foot.swinging or foot.turning or math.isnan(self._rise):
+        if foot.swinging or foot.turning:
+            return
+        if math.isnan(self._rise):
+            self._wait(gait, leg, "no foot stands on known ground")
             return
         phase = leg_phases(state)[leg] if state.walking else 0.5
         wait = (1.0 - phase) * state.cycle
@@ -195,19 +202,26 @@ class FootPlacer:
 
         last = self.footholds[leg, :2] if foot.goal is not None and not self._reasons[leg] else None
         choice = choose(ground, self._from_gait(nominal), holds, last, self._config.choice)
-        self._reasons[leg] = "" if choice.found else f"{LEGS[leg]}: {choice.reason}"
+        if not choice.found:
+            self._wait(gait, leg, choice.reason)
+            return
+        self._reasons[leg] = ""
         self.footholds[leg] = choice.place
         config = self._config
-        if not choice.found:
-            self.lift[leg] = config.least_lift
-            gait.plan_step(leg, foot.anchor, foot.z, foot.z + config.least_lift)
-            return
         goal = self._to_gait(choice.place[None])[0]
         bias = self._bias[leg] * cmath.rect(1.0, state.pose.yaw)
         high = highest_between(ground, places[leg, :2], choice.place[:2], config.width) + self._rise
         top = max(high + config.clearance, foot.z + config.least_lift, float(goal[2]) + config.least_lift)
         self.lift[leg] = top - foot.z
         gait.plan_step(leg, complex(goal[0], goal[1]) - bias, float(goal[2]), top)
+
+    def _wait(self, gait: Gait, leg: int, reason: str) -> None:
+        """Let a leg step where it stands."""
+        foot, lift = gait.state.feet[leg], self._config.least_lift
+        self._reasons[leg] = f"{LEGS[leg]}: {reason}"
+        self.footholds[leg] = np.nan
+        self.lift[leg] = lift
+        gait.plan_step(leg, foot.anchor, foot.z, foot.z + lift)
 
     def _held(self, gait: Gait, leg: int, places: FloatArray, pose: VirtualPose) -> BoolArray:
         """(k,) whether the leg holds (k, 3) places of the gait's world with the virtual robot at `pose`."""

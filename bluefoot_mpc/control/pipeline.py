@@ -370,7 +370,9 @@ class Pipeline:
             trunk_position=trunk, foothold_shift=self._shift_after_push(estimate, upright),
             # No reflex on a rate that is no longer measured.
             tilt_rate_error=error if estimate.healthy else np.zeros(2),
-            # Steps without a plan are not taken: feet in the air land at once.
             rough=self._guidance.ground is not None,
-            halt=self._modes.mode is Mode.SAFE or self._step_back.request.level >= SafetyLevel.HOLD,
+            # Steps without a plan, or blind over rough ground, are not taken: feet in the air land at once.
+            halt=self._modes.mode is Mode.SAFE
+            or self._step_back.request.level >= SafetyLevel.HOLD
+            or (self._guidance.ground is not None and not estimate.healthy),
         )  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bluefoot_mpc.settings import require_nonnegative, require_positive, require_range
+from bluefoot_mpc.settings import require_positive, require_range
 from bluefoot_mpc.types import FloatArray
 
 _LEAST_SPREAD = 1e-3
@@ -19,16 +19,16 @@ class SupportConfig:
     """How the trunk follows its support."""
 
     level_time: float = 0.4  # s, with which it follows the mean height of the feet
-    tilt_share: float = 0.5  # of the support's slope that the trunk takes on, 1
-    tilt_time: float = 1.0  # s, with which it does
+    even_deg: float = 3.0  # degrees of slope that blocks under single feet make: the trunk stays level
+    tilt_share: float = 0.7  # of the slope beyond that, which the trunk takes on, 1
+    tilt_time: float = 3.0  # s, with which it does: a cycle of steps over blocks shows no slope
     max_tilt_deg: float = 8.0  # degrees, most pitch or roll of it
 
     def __post_init__(self) -> None:
         """Check ranges."""
         require_positive(level_time=self.level_time, tilt_time=self.tilt_time)
-        require_nonnegative(max_tilt_deg=self.max_tilt_deg)
         require_range(0.0, 1.0, tilt_share=self.tilt_share)
-        require_range(0.0, 20.0, max_tilt_deg=self.max_tilt_deg)
+        require_range(0.0, 20.0, max_tilt_deg=self.max_tilt_deg, even_deg=self.even_deg)
 
 
 class SupportPlane:
@@ -61,9 +61,11 @@ class SupportPlane:
         """
         config = self._config
         self.level += min(1.0, dt / config.level_time) * (float(feet[:, 2].mean()) - self.level)
-        wanted = config.tilt_share * _tilt(feet) if walking else np.zeros(2)
-        most = math.radians(config.max_tilt_deg)
-        self.tilt = self.tilt + min(1.0, dt / config.tilt_time) * (np.clip(wanted, -most, most) - self.tilt)
+        slope = _tilt(feet) if walking else np.zeros(2)
+        beyond = np.sign(slope) * np.maximum(np.abs(slope) - math.radians(config.even_deg), 0.0)
+        wanted = config.tilt_share * beyond
+        most, time = math.radians(config.max_tilt_deg), config.tilt_time if walking else config.level_time
+        self.tilt = self.tilt + min(1.0, dt / time) * (np.clip(wanted, -most, most) - self.tilt)
 
 
 def _tilt(feet: FloatArray) -> FloatArray:

@@ -8,6 +8,8 @@ from bluefoot_mpc.evaluation.limits import Limit
 SEEDS = tuple(range(20))
 DURATION = 140.0
 """s for 1.5 m with all sweeps."""
+LONGER = {"ramp": 220.0}
+"""s, where more sweeps are needed: a way down is seen from near only."""
 BLIND_DURATION = 62.0
 """s for 1.5 m at 30 mm/s without any."""
 BLIND_TROT_DURATION = 35.0
@@ -78,7 +80,7 @@ def crossing_cases(
             options={
                 "controller": controller,
                 "world": world,
-                "duration": DURATION,
+                "duration": LONGER.get(name, DURATION),
                 "overrides": (*overrides, *mode),
             },
             seeds=seeds,

@@ -19,7 +19,7 @@ from bluefoot_mpc.terrain.frame import centres
 from bluefoot_mpc.types import BodyState, FloatArray, HeightMap, TruthSample
 
 MAP_REACH = 1.2
-"""m from the LIDAR, within which a map is compared with the truth."""
+"""m from the trunk, within which a map is compared with the truth."""
 TOPPLED_DEG = 50.0
 """degrees of tilt, beyond which a robot has toppled; a sweep takes it to 34."""
 _SEEN = 0.5
@@ -76,8 +76,10 @@ def toppled(run: RunData) -> bool | None:
     )
 
 
-def touched(run: RunData) -> dict[str, float]:
-    """S for which each part above a foot's ball touched anything, the longest first; truth."""
+def touched(run: RunData) -> dict[str, float] | None:
+    """S for which each part above a foot's ball touched anything, the longest first; None without truth."""
+    if not run.truth:
+        return None
     ticks = Counter(name for sample in run.truth for name in sample.touching)
     return {name: round(count * run.period, 2) for name, count in ticks.most_common()}
 

@@ -93,8 +93,9 @@ def cell_heights(
         upper -= sigma * _excess(count, config.trim)
         above = (height - upper[index]) / np.maximum(sigma[index], 1e-9)
         near = (above >= -_BELOW) & (above <= _ABOVE)
-        used = np.maximum(np.bincount(index[near], minlength=cells), 1)
-        upper = np.bincount(index[near], height[near], minlength=cells) / used
+        close = np.bincount(index[near], minlength=cells)
+        used = np.maximum(close, 1)
+        upper = np.where(close > 0, np.bincount(index[near], height[near], minlength=cells) / used, upper)
     uncertain = variance / used + np.maximum(spread - variance, 0.0)
     confidence = count / (count + 1.0) / (1.0 + uncertain / config.trusted**2)
     if away is not None:

@@ -87,8 +87,8 @@ def scan_points(
     if not (scan.valid and posed and distance.shape == bearing.shape and distance.ndim == 1):
         return np.zeros((0, 3))
     least = max(config.least_range, config.own_radius)
-    # Comparisons with NaN (no echo) are false.
-    distance = smooth_ranges(np.where(distance >= config.least_range, distance, np.nan), config)
+    met = np.isfinite(distance) & (distance >= config.least_range)
+    distance = smooth_ranges(np.where(met, distance, np.nan), config)
     echo = (distance >= least) & (distance <= config.greatest_range) & np.isfinite(bearing)
     distance, bearing = distance[echo], bearing[echo]
     rotation_base_to_world = rotation_from_quaternion(quaternion)

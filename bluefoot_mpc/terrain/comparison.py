@@ -36,7 +36,10 @@ class Comparison:
     @property
     def ratio(self) -> FloatArray:
         """(s, w) cost of the windows' ways over that of the cheapest; infinite where they got stuck."""
-        return np.asarray(self.greedy / np.maximum(self.optimal, 1e-12)[:, None])
+        found = np.isfinite(self.greedy)
+        return np.where(
+            found, np.where(found, self.greedy, 1.0) / np.maximum(self.optimal, 1e-12)[:, None], np.inf
+        )
 
 
 def compare(

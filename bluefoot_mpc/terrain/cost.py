@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.settings import require_nonnegative, require_range
 from bluefoot_mpc.types import FloatArray, HeightMap
 
@@ -32,7 +33,9 @@ class CostConfig:
     def __post_init__(self) -> None:
         require_nonnegative(k_var=self.k_var, k_slope=self.k_slope, k_yaw=self.k_yaw)
         require_range(0.05, 1.0, spacing=self.spacing)
-        require_range(1, 720, yaws=self.yaws)
+        require_range(2, 720, yaws=self.yaws)
+        if self.yaws % 2:
+            raise ConfigurationError(f"yaws = {self.yaws} must be even: straight ahead is one of them")
         require_range(0.0, math.pi, yaw_range=self.yaw_range)
 
 

@@ -13,6 +13,8 @@ from bluefoot_mpc.types import BoolArray, FloatArray
 
 _OFFSETS = tuple((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1))
 """Sideways and forward steps to a cell's neighbours and to itself."""
+COMPANY = 3
+"""Cells of a square, itself included, that have a height before it is believed against the median."""
 _SOBEL = {0: 2.0, 1: 1.0}
 """Weight of a neighbour by its distance sideways of the direction of the derivative."""
 
@@ -44,7 +46,8 @@ def median(height: FloatArray, size: int, spike: float = 0.0) -> FloatArray:
     Args:
         height: (n, m) m.
         size: cells along the square's side, odd; 1 leaves the map as it is.
-        spike: m off the median from which a height is replaced; 0 replaces all, the plain filter.
+        spike: m off the median from which a height is replaced, if fewer than `COMPANY` cells of its square
+            are within as much of it; 0 replaces all, the plain filter.
     """
     if size == 1:
         return height.copy()
@@ -56,11 +59,17 @@ def median(height: FloatArray, size: int, spike: float = 0.0) -> FloatArray:
     middle = 0.5 * (
         np.take_along_axis(rising, low[None], axis=0)[0] + np.take_along_axis(rising, high[None], axis=0)[0]
     )
-    off = np.abs(height - middle)
-    return np.where(off >= spike, middle, height)  # an unknown cell is off by NaN, and stays
+    off = np.abs(height - middle)  # NaN at unknown cells, which so stay
+    if spike == 0.0:
+        return np.where(off >= spike, middle, height)
+    # The corner of a block, or a post, is off as well, but not alone.
+    alike = np.count_nonzero(np.abs(rising - height) < spike, axis=0)
+    return np.where((off >= spike) & (alike < COMPANY), middle, height)
 
 
-def close_gaps(height: FloatArray, width: int, step: float) -> tuple[FloatArray, BoolArray]:
+def close_gaps(
+    height: FloatArray, width: int, step: float, seen: BoolArray | None = None
+) -> tuple[FloatArray, BoolArray]:
     """Heights with narrow gaps bridged, and which cells were.
 
     An unknown cell is a gap if known cells lie on both sides of it, in its row, column or a diagonal, with at
@@ -72,6 +81,7 @@ def close_gaps(height: FloatArray, width: int, step: float) -> tuple[FloatArray,
         height: (n, m) m.
         width: cells; 0 leaves the map as it is.
         step: m.
+        seen: (n, m) cells of which something is known that bridges must not pass; None: those with a height.
 
     Returns:
         (n, m) m and (n, m) True where a cell was a gap.
@@ -83,16 +93,19 @@ def close_gaps(height: FloatArray, width: int, step: float) -> tuple[FloatArray,
     unknown = np.isnan(height)
     n, m = height.shape
     wide = np.pad(height, width, constant_values=np.nan)
+    passable = np.pad(unknown if seen is None else ~seen, width)
 
-    def shifted(i: int, j: int) -> FloatArray:
-        return wide[width + i : width + i + n, width + j : width + j + m]
+    def there(i: int, j: int) -> tuple[slice, slice]:
+        return slice(width + i, width + i + n), slice(width + j, width + j + m)
 
     for i, j in ((0, 1), (1, 0), (1, 1), (1, -1)):
         for before in range(1, width + 1):
             for after in range(1, width + 2 - before):
-                one, two = shifted(-before * i, -before * j), shifted(after * i, after * j)
+                one, two = wide[there(-before * i, -before * j)], wide[there(after * i, after * j)]
                 difference = np.abs(two - one)
                 better = unknown & (difference <= best)  # false where either is unknown
+                for k in range(1 - before, after):
+                    better &= passable[there(k * i, k * j)]
                 filled[better] = ((one * after + two * before) / (before + after))[better]
                 best[better] = difference[better]
     return filled, unknown & ~np.isnan(filled)

@@ -107,6 +107,8 @@ def highest_between(ground: Ground, start: FloatArray, goal: FloatArray, width: 
     """
     way = np.asarray(goal, dtype=float)[:2] - np.asarray(start, dtype=float)[:2]
     length = math.hypot(*way.tolist())
+    if not math.isfinite(length):
+        return math.nan
     step = 0.5 * ground.map.cell
     along = np.linspace(0.0, 1.0, max(2, math.ceil(length / step) + 1))
     side = np.array((-way[1], way[0])) / length if length > 1e-9 else np.array((0.0, 1.0))

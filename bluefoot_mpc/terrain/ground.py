@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,13 +20,14 @@ class RatingConfig:
     edge: float = 0.008  # m by which heights of neighbouring cells differ where there is an edge
     least_distance: float = 0.013  # m from an edge or from unknown ground; nearer no foot stands
     distance: float = 0.050  # m from it; farther no place gets better
+    foot: float = 0.025  # m, holes narrower than that count as ground beside which a foot may stand
     slope: float = 0.5  # rise per metre, steepest place to stand on
 
     def __post_init__(self) -> None:
         """Check ranges."""
         require_range(0.0, 1.0, least_confidence=self.least_confidence)
         require_nonnegative(least_distance=self.least_distance)
-        require_positive(edge=self.edge, slope=self.slope)
+        require_positive(edge=self.edge, slope=self.slope, foot=self.foot)
         require_range(self.least_distance + 1e-3, 1.0, distance=self.distance)
 
 
@@ -56,7 +58,7 @@ def rate_ground(map: HeightMap, config: RatingConfig | None = None) -> Ground:
     known = np.isfinite(map.height) & (map.confidence >= config.least_confidence)
     if not known.any():
         return Ground(map=map, quality=np.zeros(map.height.shape))
-    height, even = _bridged(map.height, known, config.edge)
+    height, even = _bridged(map.height, known, config.edge, max(1, math.ceil(config.foot / map.cell)))
     high = ndimage.maximum_filter(np.where(even, height, -np.inf), size=3)
     low = ndimage.minimum_filter(np.where(even, height, np.inf), size=3)
     sure = ndimage.minimum_filter(even, size=3, mode="nearest")
@@ -72,16 +74,17 @@ def rate_ground(map: HeightMap, config: RatingConfig | None = None) -> Ground:
     return Ground(map=map, quality=np.where(free & known, quality, 0.0))
 
 
-def _bridged(height: FloatArray, known: BoolArray, edge: float) -> tuple[FloatArray, BoolArray]:
-    """Heights with small holes filled where all around agrees, and which cells have one then.
+def _bridged(height: FloatArray, known: BoolArray, edge: float, foot: int) -> tuple[FloatArray, BoolArray]:
+    """Heights with narrow holes filled where all around agrees, and which cells have one then.
 
-    Nobody steps into such a hole, but next to it: it is narrower than a foot.
+    Nobody steps into such a hole, but next to it: it is narrower than a foot with what maps err (cells).
     """
     around = np.ones((5, 5), dtype=np.bool_)
     high = ndimage.maximum_filter(np.where(known, height, -np.inf), footprint=around)
     low = ndimage.minimum_filter(np.where(known, height, np.inf), footprint=around)
     count = ndimage.uniform_filter(known.astype(np.float64), size=5, mode="constant") * 25.0
-    hole = ~known & (count >= 11.5) & (high - low <= edge)
+    wide = ndimage.binary_opening(~known, np.ones((foot, foot), dtype=np.bool_))
+    hole = ~known & ~wide & (count >= 11.5) & (high - low <= edge)
     return np.where(hole, 0.5 * (np.where(hole, high, 0.0) + np.where(hole, low, 0.0)), height), known | hole
 
 

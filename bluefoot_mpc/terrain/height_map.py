@@ -167,7 +167,7 @@ class MapBuilder:
         )  # fmt: skip
         raw, confidence = raw.reshape(shape), confidence.reshape(shape)
         sure = np.where(confidence >= config.gap_trust, raw, np.nan)
-        bridged, gaps = close_gaps(sure, config.gap, config.gap_step)
+        bridged, gaps = close_gaps(sure, config.gap, config.gap_step, seen=~np.isnan(raw))
         gaps &= np.isnan(raw)
         whole = np.where(gaps, bridged, raw)
         near = np.fmax.reduce(neighbours(confidence, config.gap), axis=0)

@@ -21,7 +21,7 @@ class OutlookConfig:
     step: float = 0.02  # m, between lines across it
     far: float = 1.6  # m, its end
     share: float = 0.35  # of a line that makes it a known one
-    gap: float = 0.05  # m, unknown, at which what is known ends
+    gap: float = 0.03  # m, unknown, at which what is known ends
     smooth: float = 0.10  # m, over which expected heights are smoothed
 
     def __post_init__(self) -> None:
@@ -41,19 +41,21 @@ class Outlook:
         height: (k,) m in the odometry frame, expected; the last known one holds beyond what is known.
         known: (k,) whether enough of the line across is known.
         gap: m, unknown, at which what is known ends.
+        step: m between the lines.
     """
 
     distance: FloatArray
     height: FloatArray
     known: BoolArray
     gap: float
+    step: float
 
     @property
     def known_until(self) -> float:
         """M ahead, where the ground that is known without a gap ends."""
         last = 0.0
         for distance in self.distance[self.known].tolist():
-            if distance - last > self.gap + 1e-9:
+            if distance - last - self.step > self.gap + 1e-9:
                 break
             last = distance
         return last
@@ -87,5 +89,5 @@ def outlook(ground: HeightMap, pose: FloatArray, config: OutlookConfig | None = 
     lines = max(1, round(config.smooth / config.step))
     return Outlook(
         distance=distance, height=ndimage.uniform_filter1d(expected, lines, mode="nearest"),
-        known=seen.mean(axis=1) >= config.share, gap=config.gap,
+        known=seen.mean(axis=1) >= config.share, gap=config.gap, step=config.step,
     )  # fmt: skip

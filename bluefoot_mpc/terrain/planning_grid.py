@@ -100,9 +100,10 @@ def planning_grid(
         # The robot stands here already, however bad the place is.
         cost[first] = config.k_side
     turned = (turn + math.pi) * config.cost.yaws / (2.0 * math.pi)
+    turned -= config.cost.yaws * round((turned - u) / config.cost.yaws)
     return PlanningGrid(
         replace(frame, height=found.height), found.known, cost, first,
-        turned if abs(turned - u) < 1.0 else float(u), cell[1] + steps, last_j, config.cost.spacing,
+        turned, cell[1] + steps, last_j, config.cost.spacing,
     )  # fmt: skip
 
 

@@ -118,8 +118,14 @@ def align(old: HeightMap, new: HeightMap, bounds: Bounds | None = None) -> Shift
     x, y, yaw, z = fit.state[:4].tolist()
     reason = _doubt(fit, bounds)
     if reason:
-        level = float(np.clip(pair.level(), -bounds.height, bounds.height))
-        return Shift(z=level, centre=centre, overlap=pair.overlap, misfit=fit.misfit, reason=reason)
+        level = pair.level()
+        return Shift(
+            z=level if abs(level) <= bounds.height else 0.0,
+            centre=centre,
+            overlap=pair.overlap,
+            misfit=fit.misfit,
+            reason=reason,
+        )
     return Shift(x=x, y=y, z=z, yaw=wrap_angle(yaw), centre=centre, overlap=pair.overlap, misfit=fit.misfit)
 
 

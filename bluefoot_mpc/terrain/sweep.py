@@ -171,5 +171,6 @@ def advance(wanted: float, level: float, estimated: float, dt: float, config: Sw
     if not math.isfinite(rate):
         return wanted
     rate = min(max(rate, -config.max_rate), config.max_rate)
-    lead = math.radians(config.max_lead_deg)
-    return min(max(wanted + rate * dt, level - lead), level + lead)
+    lead, most = math.radians(config.max_lead_deg), config.max_rate * dt
+    led = min(max(wanted + rate * dt, level - lead), level + lead)
+    return min(max(led, wanted - most), wanted + most)

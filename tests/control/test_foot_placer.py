@@ -1,5 +1,6 @@
 """Footholds on mapped ground: what the placer tells the gait, and what legs and contacts allow."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from bluefoot_mpc.control.foot_contact import FootContacts, TouchConfig
 from bluefoot_mpc.control.foot_placer import FootPlacer, PlacerConfig
 from bluefoot_mpc.control.leg_reach import LegReach
 from bluefoot_mpc.control.upright import UprightAnkles
+from bluefoot_mpc.exceptions import ConfigurationError
 from bluefoot_mpc.gait.config import GaitConfig
 from bluefoot_mpc.gait.gait import Gait, GaitInputs
 from bluefoot_mpc.gait.parameters import Style
@@ -88,8 +90,6 @@ def test_ahead_of_a_kerb_the_foot_goes_up(geometry):
 
 
 def test_unknown_ground_is_never_stepped_on(geometry):
-    gait, placer = placed(geometry, ground(known=False))
-    assert all(foot.goal is None or foot.goal == foot.anchor for foot in gait.state.feet)
     gait, placer = placed(geometry, ground())
     unknown = ground(known=False)
     for _ in range(8):
@@ -148,3 +148,27 @@ def test_an_early_touch_lands_the_foot_and_a_late_one_is_searched_for():
         contacts.step(gait, free, height, DT)
     assert before - gait.state.feet[leg].z == pytest.approx(TouchConfig().search_depth)
     assert contacts.missing[leg]
+
+
+def test_where_no_foot_stands_on_known_ground_all_step_where_they_are_and_say_why(geometry):
+    gait, placer = placed(geometry, ground(known=False), ticks=8)
+    assert all(foot.goal == foot.anchor for foot in gait.state.feet)
+    assert "no foot stands on known ground" in placer.waiting
+
+
+def test_the_first_alignment_is_whole_also_when_feet_touched_late(geometry):
+    gait, placer = Gait(GaitConfig(), FEET, Style(trunk_height=HEIGHT)), FootPlacer(geometry, PlacerConfig())
+    late = replace(body(gait, (0.2, 0.0)), contact=np.zeros(4, dtype=bool))
+    placer.step(ground(), late, gait, DT)
+    for _ in range(4):
+        placer.step(ground(), body(gait, (0.2, 0.0)), gait, DT)
+    for foot, place in zip(gait.state.feet, placer.footholds, strict=True):
+        assert foot.goal == pytest.approx(complex(place[0] - 0.2, place[1]), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"learn": math.nan}, {"learn": -5.0}, {"learn_most": math.nan}, {"learn_after": -1.0}]
+)
+def test_settings_that_mean_nothing_are_refused(wrong):
+    with pytest.raises(ConfigurationError):
+        PlacerConfig(**wrong)

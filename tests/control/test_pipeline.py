@@ -191,3 +191,24 @@ def test_the_trunk_keeps_its_pose_in_every_mode(bench):
 def test_a_stance_out_of_reach_is_refused(model):
     with pytest.raises(ConfigurationError, match="stance is out of reach"):
         Pipeline(model, ControlConfig(posture=PostureConfig(stance_x=0.4)), DT)
+
+
+def test_blind_over_rough_ground_no_foot_lifts_any_more(bench, monkeypatch):
+    bench.run(0.2, walk(0.02))
+    bench.run(DT, walk(0.02), healthy=False)
+    assert not bench.inputs[-1].halt
+    guidance = bench.pipeline._guidance
+    guide = guidance.step
+
+    def over_rough_ground(*args, **kwargs):
+        found = guide(*args, **kwargs)
+        guidance.ground = object()
+        return found
+
+    monkeypatch.setattr(guidance, "step", over_rough_ground)
+    monkeypatch.setattr(bench.pipeline._placer, "step", lambda *_: None)
+    bench.run(DT, walk(0.02))
+    assert bench.inputs[-1].halt
+    bench.run(DT, walk(0.02), healthy=True)
+    assert not bench.inputs[-1].halt
+    assert bench.inputs[-1].rough

@@ -103,3 +103,8 @@ def test_slopes_stop_at_the_unknown():
 def test_impossible_weights_are_refused(values):
     with pytest.raises(ConfigurationError):
         CostConfig(**values)
+
+
+def test_straight_ahead_is_one_of_the_yaws():
+    with pytest.raises(ConfigurationError, match="even"):
+        CostConfig(yaws=35)

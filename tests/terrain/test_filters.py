@@ -99,3 +99,24 @@ def test_known_heights_are_not_spread_over_unknown_ground() -> None:
     filled, gaps = close_gaps(height, 2, 0.010)
     assert not gaps.any()
     assert np.isnan(filled[6:]).all()
+
+
+def test_what_is_not_alone_is_no_spike() -> None:
+    """Posts of a few cells and corners of blocks stay; a single false height goes."""
+    for size in (2, 3, 4):
+        height = np.zeros((12, 12))
+        height[4 : 4 + size, 4 : 4 + size] = 0.06
+        assert (median(height, 3, spike=0.01) == height).all()
+    height = np.zeros((12, 12))
+    height[6, 6] = 0.06
+    assert (median(height, 3, spike=0.01) == 0.0).all()
+
+
+def test_bridges_pass_unknown_cells_only() -> None:
+    """A shadow beside a ridge stays unknown, also where the ridge is hardly known."""
+    row = np.array([[0.0, 0.05, np.nan, 0.0]])
+    assert np.isnan(close_gaps(row, 2, 0.01)[0][0, 2])
+    doubtful = np.array([[0.0, np.nan, np.nan, 0.0]])
+    seen = np.array([[True, True, False, True]])
+    assert close_gaps(doubtful, 2, 0.01)[1][0, 1:3].all()
+    assert not close_gaps(doubtful, 2, 0.01, seen)[1][0, 2]

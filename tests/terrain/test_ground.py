@@ -1,5 +1,7 @@
 """Where feet may stand: the rating of a map, the choice of a foothold, and what a swing must clear."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -119,3 +121,21 @@ def test_a_swing_clears_the_highest_between():
 def test_ratings_that_make_no_sense_are_refused(wrong):
     with pytest.raises(ConfigurationError):
         RatingConfig(**wrong)
+
+
+def test_no_way_from_nowhere():
+    assert math.isnan(highest_between(rate_ground(kerb()), np.array([np.nan, 0.0]), np.zeros(2), 0.03))
+
+
+@pytest.mark.parametrize(("width", "spoils"), [(1, False), (2, False), (3, True)])
+def test_a_crack_that_a_foot_fits_into_has_edges(width, spoils):
+    height = np.zeros((60, 60))
+    height[:, 30 : 30 + width] = np.nan
+    assert (rate_ground(ground_map(height)).quality[30, 29] == 0.0) == spoils
+
+
+def test_the_corner_of_what_is_unknown_is_an_edge_too():
+    height = np.zeros((60, 60))
+    height[30:, 30:] = np.nan
+    quality = rate_ground(ground_map(height)).quality
+    assert quality[29, 31] == quality[31, 29] == quality[29, 29] == 0.0

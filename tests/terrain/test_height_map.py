@@ -206,3 +206,11 @@ def test_gaps_are_bridged_between_trusted_cells_only() -> None:
         ground = builder.build(AHEAD)
         assert np.isfinite(heights_at(ground, np.array([0.81, 0.01]))) == known
         assert ground.confidence[35, 40] == (pytest.approx(0.3, abs=0.03) if known else 0.0)
+
+
+def test_many_equal_heights_are_believed() -> None:
+    """The expected excess of a maximum must not take a cell below all of its points."""
+    height, _ = cell_heights(
+        np.zeros(3000, dtype=np.intp), np.full(3000, 0.05), np.full(3000, 0.003), 1, CellConfig(trim=0.0)
+    )
+    assert height[0] == pytest.approx(0.05, abs=0.015)

@@ -97,3 +97,12 @@ def meets(pitch: float, heights) -> float:
     needed = pitch_for(x, HEIGHT - np.interp(x, AHEAD, heights), LIFT)
     below = np.flatnonzero(needed <= pitch)
     return float(x[below[0]]) if len(below) else math.inf
+
+
+def test_the_gap_is_as_wide_as_what_is_unknown():
+    def until(width):
+        map = ground(flat, lambda x: (abs(x - 0.5) > 0.5 * width) & (x < 1.2))
+        return outlook(map, np.zeros(3), OutlookConfig(gap=0.05)).known_until
+
+    assert until(0.04) == pytest.approx(1.18, abs=0.02)
+    assert until(0.08) == pytest.approx(0.45, abs=0.02)

@@ -74,3 +74,7 @@ def test_the_law_stays_where_the_estimate_is_no_number():
 def test_impossible_sweeps_are_refused(wrong):
     with pytest.raises(ConfigurationError, match=next(iter(wrong))):
         SweepConfig(**wrong)
+
+
+def test_a_level_far_away_is_gone_to_at_the_rate():
+    assert advance(0.0, 0.2, 0.0, 0.002, SweepConfig(max_rate=0.5)) == pytest.approx(0.001)

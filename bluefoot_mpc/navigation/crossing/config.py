@@ -84,7 +84,8 @@ class CrossingConfig:
         self._require_a_map_of_some_size()
         require_positive(
             stretch=self.stretch, least_stretch=self.least_stretch, rethink_time=self.rethink_time,
-            walking_period=self.walking_period, lean_deg=self.lean_deg, lean_time=self.lean_time,
+            walking_period=self.walking_period, stall=self.stall, lean_deg=self.lean_deg,
+            lean_time=self.lean_time,
         )  # fmt: skip
         require_range(0.0, 1.0, start_confidence=self.start_confidence)
         require_range(0.0, 31.0, walking_pitch_deg=self.walking_pitch_deg)

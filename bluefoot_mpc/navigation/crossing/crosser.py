@@ -30,7 +30,10 @@ from bluefoot_mpc.types import (
 
 _STILL = np.zeros(2)
 _NOTHING = np.zeros((0, 3))
-LEANS = "the trunk leans as nobody told it to: the robot fell, or lies on something; lift it up"
+LEANS = (
+    "the trunk leans as nobody told it to: the robot fell, or lies on something; "
+    "set it upright and give it a new task"
+)
 _PAUSE = 0.3
 """s without a tick, after which a sweep begins anew: the robot was told to do something else."""
 
@@ -118,7 +121,7 @@ class Crosser:
         self._sweeps = 0
         self._stood = self._waited = self._since_thought = self._stalled = self._leant = 0.0
         self._pitch = 0.0
-        self._nearest = math.inf
+        self._stalled_at = _STILL
         self._reason = ""
         self._arrived = False
         self._stepped = -math.inf
@@ -139,7 +142,10 @@ class Crosser:
         self._begin_where_the_goal_is_new(guide)
         places = foot_places(estimate)
         if not np.isfinite(places).all():
-            return self._stand(CrossingPhase.BLOCKED, reason="the estimate of the robot's pose is no number")
+            return self._stand(
+                CrossingPhase.BLOCKED,
+                reason="the estimate of the robot's pose is no number: start again from a stand",
+            )
         self._place = self._centre.step(places, dt)
         if self._origin is None:
             self._origin = self._place
@@ -219,7 +225,7 @@ class Crosser:
             self._arrive()
         elif len(thought.route.poses) > 1:
             self._stage, self._waited, self._since_thought = _Stage.WALK, 0.0, 0.0
-            self._nearest, self._stalled = math.inf, 0.0
+            self._stalled_at, self._stalled = self._place, 0.0
         else:
             self._look_again(self._reason or "no way was found")
         return self._stand(CrossingPhase.THINK, thought=thought)
@@ -230,14 +236,19 @@ class Crosser:
         """Follow the way until its end, the goal line, or a place where no foot can step."""
         goal = self._goal(guide)
         thought, points = self._looked_on_the_way(frame, estimate, goal, dt)
+        if thought is not None and len(thought.route.poses) < 2:
+            self._look_again(thought.route.reason or "no way was found")
+            return self._stand(CrossingPhase.WALK, points=points, thought=thought)
         steering = self._steer(guide, estimate)
         self._waited = self._waited + dt if feet.waiting else 0.0
         if self._is_there(goal):
             self._arrive()
         elif steering.left == 0.0:
             self._look_again(self._reason)
-        elif self._is_stuck(steering.left, dt):
-            self._look_again("no progress: something holds the robot")
+        elif self._is_stuck(dt):
+            self._look_again(
+                "no progress: something holds the robot, or its feet find no places; free it or clear the way"
+            )
         elif self._waited > self._config.patience:
             self._look_again(feet.waiting)
         elif self._thinker.failure:
@@ -258,7 +269,7 @@ class Crosser:
             return None, _NOTHING
         points = self._mapper.look(frame, estimate)
         thought = self._thinker.step()
-        if thought is not None and len(thought.route.poses) > 1:
+        if thought is not None:
             self._take(thought)
         self._since_thought += dt
         if self._since_thought >= self._config.rethink_time and not self._thinker.busy:
@@ -271,7 +282,6 @@ class Crosser:
 
     def _take(self, thought: Thought) -> None:
         self._thought, self.ground = thought, thought.ground
-        self._nearest = math.inf
         self._mapper.take(thought)
 
     def _steer(self, guide: Guide, estimate: BodyState) -> Steering:
@@ -283,10 +293,10 @@ class Crosser:
         speed = guide.speed * float(thought.pace[nearest])
         return steer(route, self._place, float(estimate.rpy[2]), speed, config)
 
-    def _is_stuck(self, left: float, dt: float) -> bool:
-        """True where the way left (m) has not become shorter for long."""
-        if left < self._nearest - self._config.progress:
-            self._nearest, self._stalled = left, 0.0
+    def _is_stuck(self, dt: float) -> bool:
+        """True where the robot has been at one place for long."""
+        if float(np.hypot(*(self._place - self._stalled_at))) > self._config.progress:
+            self._stalled_at, self._stalled = self._place, 0.0
         self._stalled += dt
         return self._stalled > self._config.stall
 
@@ -299,7 +309,8 @@ class Crosser:
         progress = float(np.hypot(*(self._place - (self._place if self._origin is None else self._origin))))
         if progress > self._furthest + self._config.progress:
             self._furthest, self._fruitless = progress, 0
-        self._fruitless += 1
+        else:
+            self._fruitless += 1
         self._stage, self._stood = _Stage.SETTLE, 0.0
         if self._fruitless >= self._config.attempts:
             self._stage = _Stage.STAY

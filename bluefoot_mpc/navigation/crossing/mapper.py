@@ -38,12 +38,14 @@ class Thought:
         route: the way.
         pace: (k,) share of the full speed at each of its poses.
         drift: m, by which the older map was moved sideways.
+        place: (2,) m, odometry frame, where the robot then was.
     """
 
     ground: Ground
     route: Route
     pace: FloatArray
     drift: float
+    place: FloatArray
 
 
 class Mapper:
@@ -85,6 +87,7 @@ class Mapper:
         if not self._stands and not _fits(self._known, under):
             radius = self._config.start_radius
             self._known = merge(None, even_ground(under, time, self._config)) if radius > 0.0 else None
+            self._place = None  # nothing was walked since it was seen
         self._stands = True
 
     @property
@@ -132,13 +135,13 @@ class Mapper:
             goal: (2,) m, odometry frame.
         """
         seen, known, place, config = self._collected, self._known, self._place, self._config
-        self._collected, self._place = Collected(config), pose[:2]
+        self._collected = Collected(config)
         way = 0.0 if place is None else float(np.hypot(*(pose[:2] - place)))
         return lambda: think(seen, known, Walked(way=way, place=pose[:2]), Aim(pose, goal), config)
 
     def take(self, thought: Thought) -> None:
         """Go on from a new map."""
-        self._known = thought.ground.map
+        self._known, self._place = thought.ground.map, thought.place
 
     def trunk_on_the_way(self, time: float) -> TrunkPose:
         """The trunk while walking: level, or with the nose down to look where it goes."""
@@ -217,7 +220,7 @@ def think(
     route = plan_route(ground.map, (x, y, yaw), (goal_x, goal_y), config.plan, ground.quality)
     route = shortened(route, _stretch(ground.map, aim.pose, config))
     pace = paces(ground.map, route.poses, config.pace) if len(route.poses) else np.zeros(0)
-    return Thought(ground=ground, route=route, pace=pace, drift=drift)
+    return Thought(ground=ground, route=route, pace=pace, drift=drift, place=aim.pose[:2])
 
 
 def _stretch(ground: HeightMap, pose: FloatArray, config: CrossingConfig) -> float:

@@ -1,5 +1,7 @@
 """Crossing rough ground: sweep, think, walk, sweep again; and what happens where that is not possible."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -175,3 +177,51 @@ def test_it_stops_where_the_next_sweep_can_still_see_the_end_of_what_is_known(mo
     plain.run(10.0)
     first = next(report for report in plain.reports if len(report.route))
     assert np.hypot(*first.route[-1, :2]) == pytest.approx(0.5, abs=0.05)
+
+
+def test_it_stays_after_three_sweeps_without_fruit_and_none_counts_that_had_some(monkeypatch):
+    bench = Bench(monkeypatch, world=lambda x, y: np.where(x > 0.7, 0.3, 0.0))
+    bench.run(70.0)
+    walked = [np.hypot(*report.route[-1, :2]) > 0.05 if len(report.route) else False
+              for report in bench.reports if report.ground is not None]  # fmt: skip
+    fruitless = len(walked) - 1 - max(k for k, fruit in enumerate(walked) if fruit)
+    assert fruitless <= 3 < len(walked)
+    once = Bench(monkeypatch, attempts=1)
+    assert once.run(40.0).phase is CrossingPhase.ARRIVED
+
+
+def test_ground_is_taken_to_be_even_again_after_a_walk_elsewhere(monkeypatch):
+    bench = Bench(monkeypatch)
+    assert bench.run(25.0, goal=(0.5, 0.0)).phase is CrossingPhase.ARRIVED
+    bench.pose = np.array([3.5, 0.0, 0.0])  # by another motion
+    bench.crosser.begin()
+    assert bench.run(30.0, goal=(4.0, 0.0)).phase is CrossingPhase.ARRIVED
+
+
+def test_on_the_way_a_plan_that_finds_no_way_ends_the_walk(monkeypatch):
+    bench = Bench(monkeypatch, incremental=True)
+    assert bench.run(6.0).phase is CrossingPhase.WALK
+    real = mapper.plan_route
+
+    def none(*args):
+        return replace(real(*args), poses=np.zeros((0, 3)), feasible=False, reason="a hole")
+
+    monkeypatch.setattr(mapper, "plan_route", none)
+    before = bench.pose[0]
+    bench.run(4.0)
+    assert bench.pose[0] < before + 0.12
+    assert bench.reports[-1].phase is not CrossingPhase.WALK
+
+
+@pytest.mark.parametrize("incremental", [False, True])
+def test_a_robot_that_is_held_looks_again(monkeypatch, incremental):
+    bench = Bench(monkeypatch, incremental=incremental, stall=5.0)
+    assert bench.run(6.0).phase is CrossingPhase.WALK
+    for _ in range(200):
+        pose = bench.pose.copy()
+        bench.run(DT)
+        bench.pose = pose
+        if bench.reports[-1].phase is not CrossingPhase.WALK:
+            break
+    assert "no progress" in bench.reports[-1].reason
+    assert bench.time < 6.0 + 7.0
