@@ -89,8 +89,8 @@ class MotionCommand:
         yaw_rate: rad/s, left positive.
         gait: name of the gait, ``"trot"`` or ``"walk"``.
         trunk: wanted offset of the trunk.
-        guide: task that decides velocity and yaw rate while walking, and the trunk's pitch on top of
-            `trunk`; None: they are as they stand here.
+        guide: task that decides velocity and yaw rate while walking, and the
+            trunk's offset in place of `trunk`; None: they are as they stand here.
     """
 
     mode: Mode = Mode.STAND
