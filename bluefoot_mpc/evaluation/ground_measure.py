@@ -13,7 +13,7 @@ def ground_figures(summary: Mapping[str, Any]) -> dict[str, float | None]:
     """Whether the ground was crossed, and how well it was known and met; None for other scenarios."""
     figures = summary["figures"]
     is_crossing = "goal_left_m" in figures
-    left, touched = figures.get("goal_left_m"), figures.get("touched", {})
+    left, touched = figures.get("goal_left_m"), figures.get("touched") or {}
     brushed_at_most = all(name.endswith(LAST_LINK) for name in touched)
     return {
         "crossed": float(summary["success"]) if is_crossing else None,
