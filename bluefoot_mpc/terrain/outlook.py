@@ -51,6 +51,11 @@ class Outlook:
     step: float
 
     @property
+    def drop(self) -> float:
+        """M by which the ground is expected to be lower than where the robot stands, at most."""
+        return float(self.height[0] - self.height.min())
+
+    @property
     def known_until(self) -> float:
         """M ahead, where the ground that is known without a gap ends."""
         last = 0.0

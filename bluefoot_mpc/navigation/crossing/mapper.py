@@ -224,10 +224,15 @@ def think(
 
 
 def _stretch(ground: HeightMap, pose: FloatArray, config: CrossingConfig) -> float:
-    """M to walk before the next sweep: from its end that one sees on where known ground ends."""
+    """M to walk before the next sweep; where the ground drops, from its end that one must join on to known ground.
+
+    On other ground, what is unknown lies in gaps and behind blocks, and the next sweep sees it no better from
+    farther away.
+    """
     ahead = outlook(ground, pose, config.outlook)
-    known = 0.0 if ahead is None else ahead.known_until
-    return min(max(known - config.overlap, config.least_stretch), config.stretch)
+    if ahead is None or ahead.drop < config.sweep.drop:
+        return config.stretch
+    return min(max(ahead.known_until - config.overlap, config.least_stretch), config.stretch)
 
 
 def _fits(known: HeightMap | None, under: FloatArray) -> bool:

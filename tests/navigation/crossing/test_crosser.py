@@ -165,15 +165,15 @@ def test_a_robot_that_lies_on_something_goes_nowhere(monkeypatch, tilt):
 
 
 def test_it_stops_where_the_next_sweep_can_still_see_the_end_of_what_is_known(monkeypatch):
-    # Ground of which nothing comes back between 0.85 and 1.0 m is first seen from nearer.
+    # A way down of which nothing comes back between 0.85 and 1.0 m is first seen from nearer.
     def world(x, y):
-        return np.where((x > 0.85) & (x < 1.0), np.nan, 0.0)
+        return np.where((x > 0.85) & (x < 1.0), np.nan, -0.18 * np.maximum(x - 0.8, 0.0))
 
     bench = Bench(monkeypatch, world=world)
     bench.run(30.0)
     stops = [report for report in bench.reports if len(report.route)]
     assert np.hypot(*stops[0].route[-1, :2]) == pytest.approx(0.35, abs=0.05)
-    plain = Bench(monkeypatch)
+    plain = Bench(monkeypatch, world=lambda x, y: np.where((x > 0.85) & (x < 1.0), np.nan, 0.0))
     plain.run(10.0)
     first = next(report for report in plain.reports if len(report.route))
     assert np.hypot(*first.route[-1, :2]) == pytest.approx(0.5, abs=0.05)
