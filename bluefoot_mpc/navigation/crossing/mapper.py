@@ -224,9 +224,9 @@ def think(
 
 
 def _stretch(ground: HeightMap, pose: FloatArray, config: CrossingConfig) -> float:
-    """M to walk before the next sweep; where the ground drops, from its end that one must join on to known ground.
+    """M to walk before the next sweep.
 
-    On other ground, what is unknown lies in gaps and behind blocks, and the next sweep sees it no better from
+    Where the ground drops, that sweep must join on to what is known: rays there are nearly as steep as it. On other ground, what is unknown lies in gaps and behind blocks, and the next sweep sees it no better from
     farther away.
     """
     ahead = outlook(ground, pose, config.outlook)
