@@ -226,8 +226,8 @@ def think(
 def _stretch(ground: HeightMap, pose: FloatArray, config: CrossingConfig) -> float:
     """M to walk before the next sweep.
 
-    Where the ground drops, that sweep must join on to what is known: rays there are nearly as steep as it. On other ground, what is unknown lies in gaps and behind blocks, and the next sweep sees it no better from
-    farther away.
+    Where the ground drops, that sweep must join on to what is known: rays there are nearly as steep as it.
+    On other ground, what is unknown lies in gaps and behind blocks, and is seen no better from farther away.
     """
     ahead = outlook(ground, pose, config.outlook)
     if ahead is None or ahead.drop < config.sweep.drop:
