@@ -12,6 +12,9 @@ from bluefoot_mpc.settings import require_positive, require_range
 from bluefoot_mpc.terrain.frame import heights_at
 from bluefoot_mpc.types import BoolArray, FloatArray, HeightMap
 
+_HIGH = 0.8
+"""Share of a line's cells that lie lower than the height which counts: a gap's floor is not walked on."""
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class OutlookConfig:
@@ -19,17 +22,19 @@ class OutlookConfig:
 
     width: float = 0.40  # m, of the strip: what feet may need
     step: float = 0.02  # m, between lines across it
-    far: float = 1.6  # m, its end
+    far: float = 1.3  # m, its end; beyond hardly a ray meets the ground
     share: float = 0.35  # of a line that makes it a known one
+    few: float = 0.1  # of a line, without which nothing is expected of it
     gap: float = 0.03  # m, unknown, at which what is known ends
     smooth: float = 0.10  # m, over which expected heights are smoothed
+    dip: float = 0.14  # m, up to which what lies lower is a gap that is stepped over
 
     def __post_init__(self) -> None:
         """Check ranges."""
-        require_positive(width=self.width, smooth=self.smooth, gap=self.gap)
+        require_positive(width=self.width, smooth=self.smooth, gap=self.gap, dip=self.dip)
         require_range(0.005, 0.1, step=self.step)
         require_range(0.2, 5.0, far=self.far)
-        require_range(0.0, 1.0, share=self.share)
+        require_range(0.01, 1.0, share=self.share, few=self.few)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -52,8 +57,8 @@ class Outlook:
 
     @property
     def drop(self) -> float:
-        """M by which the ground is expected to be lower than where the robot stands, at most."""
-        return float(self.height[0] - self.height.min())
+        """M by which the ground is expected to go down somewhere ahead."""
+        return float((np.maximum.accumulate(self.height) - self.height).max())
 
     @property
     def known_until(self) -> float:
@@ -86,12 +91,12 @@ def outlook(ground: HeightMap, pose: FloatArray, config: OutlookConfig | None = 
     places = np.stack((x + c * ahead - s * left, y + s * ahead + c * left), axis=-1)
     heights = heights_at(ground, places)
     seen = np.isfinite(heights)
-    some = seen.any(axis=1)
+    some = seen.mean(axis=1) >= config.few
     if not some.any():
         return None
-    middle = np.array([np.median(line[here]) for line, here in zip(heights[some], seen[some], strict=True)])
-    expected = np.interp(distance, distance[some], middle)
-    lines = max(1, round(config.smooth / config.step))
+    high = [np.quantile(line[here], _HIGH) for line, here in zip(heights[some], seen[some], strict=True)]
+    lines, dip = (max(1, round(length / config.step)) for length in (config.smooth, config.dip))
+    expected = ndimage.grey_closing(np.interp(distance, distance[some], high), dip, mode="nearest")
     return Outlook(
         distance=distance, height=ndimage.uniform_filter1d(expected, lines, mode="nearest"),
         known=seen.mean(axis=1) >= config.share, gap=config.gap, step=config.step,

@@ -27,7 +27,7 @@ class SweepConfig:
     pitch_min_deg: float = 11.0  # degrees nose down; the plane then meets level ground 1.27 m ahead
     pitch_max_deg: float = 31.0  # degrees nose down; 0.44 m ahead
     steepest_deg: float = 34.0  # degrees nose down, where the ground ahead drops
-    drop: float = 0.03  # m by which it does, at least, within the range of level ground
+    drop: float = 0.045  # m by which it does, at least, within the range of level ground
     spacing: Literal["ground", "pitch"] = "ground"  # levels even along level ground, or even in pitch
     ground_step: float = 0.014  # m between the lines of neighbouring levels on level ground
     count: int = 40  # steps between levels that are even in pitch (N_s in the thesis)

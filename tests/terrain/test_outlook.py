@@ -36,6 +36,14 @@ def test_heights_are_those_of_the_strip_and_hold_on_beyond_what_is_known():
     np.testing.assert_allclose(found.height[found.distance > 1.1], -0.1, atol=0.002)
 
 
+def test_the_floor_of_gaps_is_no_way_down():
+    def stones(x):
+        return np.where(x % 0.18 < 0.12, 0.0, -0.08)
+
+    assert outlook(ground(stones), np.zeros(3)).drop < 0.015
+    assert outlook(ground(lambda x: -SLOPE * np.clip(x - 0.6, 0.0, 0.4)), np.zeros(3)).drop > 0.06
+
+
 def test_the_strip_turns_with_the_robot():
     found = outlook(ground(lambda x: 0.1 * x), np.array([1.0, 0.0, math.pi]), OutlookConfig(far=1.0))
     assert found.height[0] > found.height[20] > found.height[40]
